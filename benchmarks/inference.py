@@ -40,7 +40,7 @@ def infer(n: int) -> None:
 
         rescoring.score_first(simulate(rng=np.random.default_rng(1)), made.directory, n=n)
         readable = truth_values.readable_digests()
-        (stale,) = confidence.stale(now=timezone.now(), held=readable)
+        (stale,) = confidence.stale(now=timezone.now(), readable_truths=readable)
         started_s = time.process_time()
         assert confidence.infer(stale, now=timezone.now())
         print(f"inference.{n} = {time.process_time() - started_s:.2f} s of a worker", flush=True)

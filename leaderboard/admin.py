@@ -17,18 +17,18 @@ for _model in tuple(admin.site._registry):
 
 
 class ReadOnlyAdmin(admin.ModelAdmin):
-    """Looks, does not touch. `docs/maintainers.md` says where each thing is changed."""
+    """Shows rows, changes none. `docs/maintainers.md` says where each thing is changed."""
 
     def has_add_permission(self, request: HttpRequest) -> bool:
-        """Nobody adds here."""
+        """Never."""
         return False
 
     def has_change_permission(self, request: HttpRequest, obj: Model | None = None) -> bool:
-        """Nobody changes here."""
+        """Never."""
         return False
 
     def has_delete_permission(self, request: HttpRequest, obj: Model | None = None) -> bool:
-        """Nobody deletes here."""
+        """Never."""
         return False
 
 

@@ -45,19 +45,19 @@ def record(
         for name, text in (names or {}).items()
     }
     AuditText.objects.bulk_create(texts.values())
-    told = _plain(details or {}) | {name: f"{_TEXT}{row.pk}" for name, row in texts.items()}
-    return AuditEvent.objects.create(verb=verb, noun=noun, noun_id=noun_id, actor=actor, details=told)
+    stored = _plain(details or {}) | {name: f"{_TEXT}{row.pk}" for name, row in texts.items()}
+    return AuditEvent.objects.create(verb=verb, noun=noun, noun_id=noun_id, actor=actor, details=stored)
 
 
 def names_in(events: Iterable[AuditEvent]) -> dict[str, str]:
-    """The names that these events speak of, by what stands for them in `details`; blanked ones are empty."""
-    told = [value for event in events for value in event.details.values()]
-    refs = [value for value in told if isinstance(value, str) and value.startswith(_TEXT)]
+    """The names that these events speak of, by their reference in `details`; blanked ones are empty."""
+    values = [value for event in events for value in event.details.values()]
+    refs = [value for value in values if isinstance(value, str) and value.startswith(_TEXT)]
     ids = [value.removeprefix(_TEXT) for value in refs if _IS_TEXT.fullmatch(value)]
-    found = {
+    texts = {
         f"{_TEXT}{pk}": text for pk, text in AuditText.objects.filter(pk__in=ids).values_list("pk", "text")
     }
-    return dict.fromkeys(refs, "") | found
+    return dict.fromkeys(refs, "") | texts
 
 
 def blank(rows: QuerySet[AuditText]) -> int:
@@ -150,7 +150,7 @@ def events(
 
 @dataclass(frozen=True)
 class Break:
-    """A place where the chain does not hold."""
+    """An event at which the chain is broken."""
 
     event_id: int
     what: str
@@ -158,7 +158,7 @@ class Break:
 
 @dataclass(frozen=True)
 class Verification:
-    """What going through the chain found: its length, its last hash, the first places that do not hold."""
+    """The state of the chain: its length, its last hash, the first breaks."""
 
     n_events: int
     tip: str
@@ -167,9 +167,9 @@ class Verification:
 
 
 def verify(*, expected_hash: str = "") -> Verification:
-    """Compute every hash anew. With `expected_hash`, which was noted elsewhere, some event has to have it."""
+    """Compute every hash again. `expected_hash`, noted elsewhere, must be the hash of some event."""
     n_events, tip, breaks = 0, GENESIS, []
-    is_found = not expected_hash
+    is_known = not expected_hash
     not_yet = AuditEvent.objects.unsealed()
     sealed = AuditEvent.objects.exclude(hash=None).order_by("seal_number")
     for event in sealed.iterator(chunk_size=_CHUNK):
@@ -178,9 +178,9 @@ def verify(*, expected_hash: str = "") -> Verification:
             breaks.append(Break(event.pk, f"stands {before}, and follows another one: something is missing"))
         if event.hash != event.hash_after(event.previous_hash or ""):
             breaks.append(Break(event.pk, "says something else than when it was written"))
-        is_found = is_found or event.hash == expected_hash
+        is_known = is_known or event.hash == expected_hash
         n_events, tip = n_events + 1, event.hash or ""
-    if not is_found:
+    if not is_known:
         breaks.append(
             Break(0, f"no event has the hash {expected_hash[:64]}: the end was cut off or rewritten")
         )

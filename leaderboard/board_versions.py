@@ -27,9 +27,9 @@ _CHECK_AND_LOCK = f"SET CONSTRAINTS ALL IMMEDIATE; SELECT pg_advisory_xact_lock(
 
 
 def bump(*split_ids: str) -> None:
-    """What everybody sees of these splits' boards has changed. To be called in the transaction of the change.
+    """Raise the version of these splits' boards. Call it in the transaction of the change.
 
-    Call it last of all that a verb writes: see `lock`.
+    Call it after all other writes: see `lock`.
     """
     lock()
     for split_id in split_ids:
@@ -40,7 +40,7 @@ def bump(*split_ids: str) -> None:
 
 
 def lock() -> None:
-    """Let nobody else change a board until the transaction ends; to be called where it ends soon.
+    """Prevent other changes of boards until the transaction ends; call it where it ends soon.
 
     Foreign keys of the rows written until now are checked before, since at COMMIT they would wait for rows
     whose holder waits for this.
@@ -55,8 +55,8 @@ def lock() -> None:
 
 def number_of(split_id: str) -> int:
     """How often a split's boards have changed."""
-    found = BoardVersion.objects.filter(split=split_id).values_list("number", flat=True).first()
-    return found or 0
+    number = BoardVersion.objects.filter(split=split_id).values_list("number", flat=True).first()
+    return number or 0
 
 
 def sum_of_all() -> int:
@@ -65,16 +65,16 @@ def sum_of_all() -> int:
 
 
 def bump_all() -> None:
-    """The same for every split: a team's name, say, may stand on each of them."""
+    """Bump every split, as when a team's name changes, which may be on each board."""
     bump(*Split.objects.order_by("name").values_list("name", flat=True))
 
 
 def bump_passed_deadlines(*, now: datetime) -> int:
-    """Count for each split that it has opened or closed since, or that an announcement has ended.
+    """Bump each split that has opened or closed since, or whose announcement has ended.
 
-    Its pages say so. Returns how many had.
+    Returns how many were bumped.
     """
-    n_told = 0
+    n_bumped = 0
     site_ends_at = PageVersion.announcement().values_list("ends_at", flat=True).first()
     for split in Split.objects.all():
         times = (split.opens_at, split.closes_at, split.announcement_ends_at, site_ends_at)
@@ -84,8 +84,8 @@ def bump_passed_deadlines(*, now: datetime) -> int:
             with transaction.atomic():
                 bump(split.pk)
                 BoardVersion.objects.filter(split=split).update(n_times_passed=n_passed)
-            n_told += 1
-    return n_told
+            n_bumped += 1
+    return n_bumped
 
 
 def bump_for_methods(method_ids: Iterable[uuid.UUID]) -> None:
@@ -101,9 +101,9 @@ def bump_for_methods(method_ids: Iterable[uuid.UUID]) -> None:
 
 
 def bump_for_evaluations(evaluation_ids: Iterable[uuid.UUID]) -> None:
-    """The same for the splits on whose boards these evaluations stand, just decided, for everybody to see.
+    """Bump the splits whose public boards show these evaluations, just decided.
 
-    Of private methods and editions in preparation the workers alone hear.
+    For private methods and editions in preparation only workers are notified.
     """
     # Before looking who is private: whoever shows a method holds this until it is shown.
     lock()

@@ -47,4 +47,4 @@ def start_poller(**_: object) -> None:
     @worker_shutdown.connect(weak=False)
     def finish_what_is_in_hand(**_: object) -> None:
         """Let the pollers finish, as Celery lets a task; else an evaluation waits for its lease to end."""
-        stop_pollers(pollers, patience_s=app.conf.worker_soft_shutdown_timeout)
+        stop_pollers(pollers, timeout_s=app.conf.worker_soft_shutdown_timeout)

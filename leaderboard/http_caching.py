@@ -41,7 +41,7 @@ def is_cacheable(response: Any) -> bool:
 
 
 def is_known(request: HttpRequest, etag: str) -> bool:
-    """Whether whoever asks has the answer of this ETag (with its quotes), so that 304 says enough."""
+    """Whether the client has the answer of this ETag (with its quotes), so that 304 is enough."""
     header = request.META.get("HTTP_IF_NONE_MATCH")
     if not header:
         return False

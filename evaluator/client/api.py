@@ -248,9 +248,9 @@ class Client:
         """Ask until the submission is final and has its intervals, giving every answer.
 
         For the intervals it waits `INTERVALS_WITHIN_S` at most: workers make them when no submission waits.
-        The server says when to ask again. Most files are scored within a second, so the first looks come early.
-        A server that is away or busy is asked less and less often. Raises TimedOut after `timeout_s` seconds;
-        of the other errors only those that waiting cannot cure.
+        The server says when to ask again. Most files are scored within a second, so the first looks
+        come soon. A server that is away or busy is asked less and less often. Raises TimedOut after
+        `timeout_s` seconds; of the other errors only those that waiting cannot cure.
         """
         until_s = self.monotonic_s() + timeout_s
         last: Submission | None = None
@@ -276,15 +276,18 @@ class Client:
                     until_s = min(until_s, self.monotonic_s() + INTERVALS_WITHIN_S)
             is_same = (before and before.state) == (last and last.state)
             n_same = n_same + 1 if is_same else 1  # a change: ask often again
-            delay_s = again_s or self.patience.delay_s(n_failed=n_same, retry_after_s=None, rng=self.rng)
-            if 0 < n_looks <= N_EARLY_LOOKS and delay_s <= 1:  # Retry-After has no way to say less
-                delay_s = EARLY_LOOK_S
+            delay_s = self._next_look_s(again_s, n_same=n_same, n_looks=n_looks)
             if self.monotonic_s() + delay_s >= until_s:
                 if last is not None and last.is_final:
                     return
                 what = f"submission {submission_id} is not final"
                 raise TimedOut(what=what, timeout_s=timeout_s, submission_id=submission_id, submission=last)
             self.sleep(delay_s)
+
+    def _next_look_s(self, again_s: float | None, *, n_same: int, n_looks: int) -> float:
+        if again_s == 1 and n_looks <= N_EARLY_LOOKS:  # Retry-After has no way to say less
+            return EARLY_LOOK_S
+        return again_s or self.patience.delay_s(n_failed=n_same, retry_after_s=None, rng=self.rng)
 
     def _listed(self, kind: type[T], *path: str) -> Iterator[T]:
         """The rows of a list, page after page."""

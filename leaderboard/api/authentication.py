@@ -22,14 +22,14 @@ class BearerAuthentication(TokenAuthentication):
 
     def authenticate(self, request: Request) -> tuple[User, ApiToken] | None:
         """The user and the token. Raises `AuthenticationFailed`, or `PermissionDenied` beyond its limits."""
-        found: tuple[User, ApiToken] | None = super().authenticate(request)
-        if found is not None:
+        user_and_token: tuple[User, ApiToken] | None = super().authenticate(request)
+        if user_and_token is not None:
             view = request.parser_context["view"]
             usual = Scope.READ if request.method in SAFE_METHODS else Scope.SUBMIT
-            _require_scope(found[1], getattr(view, "token_scopes", (usual,)))
+            _require_scope(user_and_token[1], getattr(view, "token_scopes", (usual,)))
             if "split" in view.kwargs:
-                require_split(found[1], view.kwargs["split"])
-        return found
+                require_split(user_and_token[1], view.kwargs["split"])
+        return user_and_token
 
     def authenticate_credentials(self, token: bytes) -> tuple[User, ApiToken]:
         """The token's owner and the token. Raises `AuthenticationFailed`."""

@@ -72,14 +72,14 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
         help_text="The result as a sentence. Its p is uncorrected, for this column and pair alone."
     )
 
-    def get_detectable_difference(self, found: Difference) -> float | None:
-        return rounded(found.detectable_difference, decimals=self.context["decimals"])
+    def get_detectable_difference(self, difference: Difference) -> float | None:
+        return rounded(difference.detectable_difference, decimals=self.context["decimals"])
 
-    def get_sentence(self, found: Difference) -> str:
+    def get_sentence(self, difference: Difference) -> str:
         return sentences.sentence(
             **self.context["names"],
             name=self.field_name or "",
-            found=found,
+            found=difference,
             decimals=self.context["decimals"],
             withheld=self.context["withheld"],
         )
@@ -113,10 +113,10 @@ class PairSerializer(serializers.Serializer[Pair]):
     def get_differences(self, pair: Pair) -> dict[str, Any] | None:
         if pair.differences is None:
             return None
-        found = {name: pair.differences.get(name) for name in pair.first.scores}
+        by_score = {name: pair.differences.get(name) for name in pair.first.scores}
         names = {"first": pair.first.method, "second": pair.second.method}
         context = {"names": names, "decimals": pair.first.decimals, "withheld": pair.withheld}
-        return dict(DifferencesSerializer(found, context=context).data)
+        return dict(DifferencesSerializer(by_score, context=context).data)
 
     def get_sentence(self, pair: Pair) -> str:
         return pair.sentence()
@@ -167,7 +167,7 @@ class CompareView(APIView):
         name, number = (request.query_params.get(key, "") for key in ("split", "edition"))
         require_split(request.auth, name)  # authentication does so for splits in the path alone
         split = current_split(request, name)
-        found = comparisons.compare(
+        compared = comparisons.compare(
             methods=[comparisons.method_id(text) for text in request.query_params.getlist("m")],
             split=split,
             viewer=request.user,
@@ -175,7 +175,7 @@ class CompareView(APIView):
             address=rate_limits.address_of(request),
             edition=published_edition(split, edition_number(number)) if number else None,
         )
-        data = ComparedSerializer(found).data
-        if found.is_complete:
+        data = ComparedSerializer(compared).data
+        if compared.is_complete:
             return Response(data)
         return Response(data, status=202, headers={"Retry-After": str(RETRY_AFTER_S)})

@@ -118,8 +118,8 @@ class PreviewSerializer(serializers.Serializer[preview.Preview]):
     progress = RescoringSerializer(help_text="Progress of its scoring.")
     changes = serializers.SerializerMethodField(help_text="One flat row for each submission.")
 
-    def get_changes(self, found: preview.Preview) -> list[dict[str, Any]]:
-        return preview.rows(found)
+    def get_changes(self, edition_preview: preview.Preview) -> list[dict[str, Any]]:
+        return preview.rows(edition_preview)
 
 
 EDITIONS = Edition.objects.select_related("split__published_edition", "ground_truth")

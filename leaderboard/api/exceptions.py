@@ -26,8 +26,8 @@ UNAUTHORIZED = (exceptions.NotAuthenticated, exceptions.AuthenticationFailed, ex
 class BadValue(Exception):
     """An invalid value of a query parameter."""
 
-    def __init__(self, code: str, name: str, found: str, expected: str) -> None:
-        super().__init__(f"The parameter '{name}' is {found[:60]!r}; expected {expected}.")
+    def __init__(self, code: str, name: str, given: str, expected: str) -> None:
+        super().__init__(f"The parameter '{name}' is {given[:60]!r}; expected {expected}.")
         self.code = code
         self.where = name
 

@@ -215,8 +215,8 @@ class MethodView(APIView):
     )
     def patch(self, request: Request, method_id: UUID) -> Response:
         """Edit a method of your team: fields left out stay as they are, null clears a field."""
-        found = _own(request, method_id)
-        edited = editing.edit(method=found, changes=_fields(request), actor=cast("User", request.user))
+        method = _own(request, method_id)
+        edited = editing.edit(method=method, changes=_fields(request), actor=cast("User", request.user))
         return Response(_data(edited, request))
 
 
@@ -239,12 +239,12 @@ class VisibilityView(APIView):
     )
     def get(self, request: Request, method_id: UUID) -> Response:
         """Preview the publication of your method: its public rows, and the ranks that would change."""
-        found, now = _own(request, method_id), timezone.now()
+        method, now = _own(request, method_id), timezone.now()
         wanted = request.query_params.get("as", "")
         if wanted not in (Visibility.ANONYMOUS, Visibility.PUBLIC):
             raise BadValue("bad-visibility", "as", wanted, "ANONYMOUS or PUBLIC")
-        visibility.require_possible(found, visibility=wanted, reveal_at=None, now=now)
-        foreseen = visibility_preview.preview(method=found, visibility=wanted, now=now)
+        visibility.require_possible(method, visibility=wanted, reveal_at=None, now=now)
+        foreseen = visibility_preview.preview(method=method, visibility=wanted, now=now)
         return Response(ForeseenSerializer(foreseen).data)
 
     @extend_schema(
@@ -254,12 +254,12 @@ class VisibilityView(APIView):
     )
     def post(self, request: Request, method_id: UUID) -> Response:
         """Publish your method, anonymous or public. Cannot be undone: needs `confirm`."""
-        found, fields = _own(request, method_id), _fields(request)
+        method, fields = _own(request, method_id), _fields(request)
         if fields.get("confirm") is not True:
             sentence = "Publishing a method cannot be undone; expected the field 'confirm' to be true."
             raise Refused("not-confirmed", sentence, field="confirm")
         published = visibility.change(
-            method=found,
+            method=method,
             visibility=str(fields.get("visibility", "")),
             reveal_at=_moment(fields.get("reveal_at")),
             actor=cast("User", request.user),

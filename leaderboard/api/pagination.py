@@ -54,15 +54,15 @@ def page_of(rows: QuerySet[Row], request: Request, *, order: str) -> Page[Row]:
         word = "lt" if is_descending else "gt"
         value = getattr(last, column)
         rows = rows.filter(Q(**{f"{column}__{word}": value}) | Q(**{column: value, f"pk__{word}": last.pk}))
-    found = list(rows.order_by(order, f"{sign}pk")[: limit + 1])
-    if len(found) <= limit:
-        return Page(found, {})
-    found = found[:limit]
+    page_rows = list(rows.order_by(order, f"{sign}pk")[: limit + 1])
+    if len(page_rows) <= limit:
+        return Page(page_rows, {})
+    page_rows = page_rows[:limit]
     query = request.query_params.copy()
-    query["after"] = str(found[-1].pk)
+    query["after"] = str(page_rows[-1].pk)
     # The site's own URL, whatever the Host header says: the response may be cached for others.
     address = f"{settings.SITE_URL}{request.path}?{query.urlencode()}"
-    return Page(found, {"Link": f'<{address}>; rel="next"'})
+    return Page(page_rows, {"Link": f'<{address}>; rel="next"'})
 
 
 def _row(rows: QuerySet[Row], after: str) -> Row:

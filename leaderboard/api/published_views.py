@@ -57,8 +57,8 @@ class PublishedTablesView(APIView):
     @extend_schema(operation_id="list_published_tables", responses=PublishedTableSerializer(many=True))
     def get(self, request: Request) -> Response:
         """Main results, ablations, cameras and scripts, with the values that the paper prints."""
-        found = [published.document(shown) for shown in published.printed_tables()]
-        return Response(PublishedTableSerializer(found, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
+        documents = [published.document(shown) for shown in published.printed_tables()]
+        return Response(PublishedTableSerializer(documents, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
 
 
 class PublishedTableView(APIView):
@@ -67,7 +67,7 @@ class PublishedTableView(APIView):
     @extend_schema(operation_id="published_table", responses={200: PublishedTableSerializer, **errors(404)})
     def get(self, request: Request, name: str) -> Response:
         """A table by its name, as `ablation-frame-gap`."""
-        found = next((table for table in published_tables().tables if table.name == name), None)
-        if found is None:
+        match = next((table for table in published_tables().tables if table.name == name), None)
+        if match is None:
             raise Http404
-        return Response(PublishedTableSerializer(published.document(published.printed(found))).data)
+        return Response(PublishedTableSerializer(published.document(published.printed(match))).data)

@@ -107,7 +107,7 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
     n_problems = serializers.IntegerField(help_text="Number of problems, equal and unlisted ones included.")
 
     def to_representation(self, instance: SubmissionView) -> dict[str, Any]:
-        submission, progress, place = instance.submission, instance.progress, instance.place
+        submission, progress, position = instance.submission, instance.progress, instance.position
         method = submission.method
         is_waiting = progress.n_ahead is not None
         return {
@@ -141,7 +141,7 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
                 if name in instance.intervals
             },
             "awaits_intervals": instance.awaits_intervals,
-            "rank": place.rank if place else None,
+            "rank": position.rank if position else None,
             "counts": progress.counts or None,
             "n_out_of_range": progress.n_out_of_range,
             "truncated": progress.truncated,

@@ -79,8 +79,8 @@ class SubmissionsView(APIView):
         """Your team's submissions, newest first, in pages; `Link` names the next page."""
         rows = visible(request).prefetch_related(Prefetch("evaluations", EVALUATIONS))
         page = pagination.page_of(rows, request, order="-submitted_at")
-        found = outcomes.for_submissions(page.rows, now=timezone.now())
-        data = SubmissionSerializer(found, many=True).data  # type: ignore[arg-type]  # many rows, as it says
+        views = outcomes.for_submissions(page.rows, now=timezone.now())
+        data = SubmissionSerializer(views, many=True).data  # type: ignore[arg-type]  # many rows, as it says
         return Response(data, headers=page.headers)
 
 
@@ -100,10 +100,10 @@ class SubmissionView(APIView):
     def get(self, request: Request, submission_id: UUID) -> Response:
         """State, then scores or problems. The submission of another team gives 404."""
         rows = visible(request).prefetch_related(Prefetch("evaluations", EVALUATIONS))
-        found = get_object_or_404(rows, pk=submission_id)
-        (outcome,) = outcomes.for_submissions([found], now=timezone.now())
-        again = {} if outcome.progress.is_final else {"Retry-After": str(ASK_AGAIN_S)}
-        return Response(SubmissionSerializer(outcome).data, headers=again)
+        submission = get_object_or_404(rows, pk=submission_id)
+        (view,) = outcomes.for_submissions([submission], now=timezone.now())
+        again = {} if view.progress.is_final else {"Retry-After": str(ASK_AGAIN_S)}
+        return Response(SubmissionSerializer(view).data, headers=again)
 
 
 def _submission_request(request: Request, form: QueryDict, *, now: datetime) -> intake.SubmissionRequest:

@@ -14,12 +14,12 @@ if TYPE_CHECKING:  # views make their classes with these
 
 def counted(request: HttpRequest) -> list["ApiThrottle"]:
     """The throttles that counted this request, for the headers of its response; a list to append to."""
-    found: list[ApiThrottle] = request.__dict__.setdefault("_counted", [])
-    return found
+    throttles: list[ApiThrottle] = request.__dict__.setdefault("_counted", [])
+    return throttles
 
 
 class ApiThrottle(rate_limits.Throttle):
-    """A rate of `settings.API_RATES`, told in the headers of the response."""
+    """A rate of `settings.API_RATES`, shown in the headers of the response."""
 
     def allow_request(self, request: Request, view: "APIView | None" = None) -> bool:
         is_allowed = super().allow_request(request, view)

@@ -34,10 +34,10 @@ def visible(request: Request) -> SubmissionQuerySet:
 def current_split(request: Request, name: str) -> Split:
     """A split as the cache has it. Raises `Http404`."""
     splits = snapshots.splits_of(request._request)
-    found = next((split for split in splits if split.pk == name), None)
-    if found is None:
+    match = next((split for split in splits if split.pk == name), None)
+    if match is None:
         raise Http404
-    return found
+    return match
 
 
 def published_edition(split: str | Split, number: int) -> Edition:
@@ -87,8 +87,8 @@ class ManifestView(APIView):
     def get(self, request: Request, split: str) -> HttpResponseBase:
         """All columns of the ground truth but the time to contact, as CSV."""
         rows = Split.objects.shown().select_related("published_edition__ground_truth")
-        found = get_object_or_404(rows, pk=split)
-        digest = history.manifest_digest(split=found, number=request.GET.get("edition", ""))
+        row = get_object_or_404(rows, pk=split)
+        digest = history.manifest_digest(split=row, number=request.GET.get("edition", ""))
         if digest is None:
             raise Http404
         tag = {"ETag": f'"{digest}"'}
@@ -97,7 +97,7 @@ class ManifestView(APIView):
         return FileResponse(
             files.store().open(files.manifest_name(digest), "rb"),
             as_attachment=True,
-            filename=f"tsttc-{found.pk}-manifest.csv",
+            filename=f"tsttc-{row.pk}-manifest.csv",
             content_type="text/csv",
             headers=tag,
         )

@@ -27,7 +27,7 @@ _KEY = "TSTTC_RECEIPT_KEY"
 def make(*, into: str, now: datetime) -> Contents:
     """Write a backup of the whole site into a folder that is empty or has an earlier one.
 
-    What rows name and nobody has any more is in `missing`; everything else is there. Raises `NoBackup`, and
+    Files that rows name and that are lost are in `missing`; everything else is there. Raises `NoBackup`, and
     `OSError` where a file cannot be read or written: an earlier backup in the folder then stays as it was.
     """
     if environment.PRODUCTION and not os.environ.get(_KEY):
@@ -40,11 +40,11 @@ def make(*, into: str, now: datetime) -> Contents:
     try:
         with database.one_moment():
             saved = database.save(rows)
-            needed, anew = contents.named_files()
+            needed, remade = contents.named_files()
             missing = contents.missing_values()
             migrations, boards = contents.applied_migrations(), contents.board_digests()
             tip = audit.verify().tip
-        kept = {name: keep(folder, name, former) for name in [*needed, *anew]}
+        kept = {name: keep(folder, name, former) for name in [*needed, *remade]}
         private = {
             path.name: _copy(folder / contents.GROUND_TRUTH / path.name, path.open)
             for path in contents.private_files()

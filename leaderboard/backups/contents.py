@@ -1,4 +1,4 @@
-"""What a backup holds beside the tables, and how a folder says what is in it."""
+"""The files of a backup next to its tables, and the list of them in its folder."""
 
 import hashlib
 import json
@@ -23,8 +23,8 @@ LIST: Final = "backup.json"
 FILES: Final = "files"
 GROUND_TRUTH: Final = "ground-truth"
 FORMAT: Final = 3
-# Sums and manifests that workers make anew, and files that somebody writes at this moment.
-_MADE_ANEW: Final = "bags"
+# Sums and manifests that workers make again; files named tmp… are being written at this moment.
+_REMADE_FOLDER: Final = "bags"
 _SHOWN: Final = 10
 
 
@@ -62,9 +62,9 @@ class Contents:
             document = json.loads(path.read_text(encoding="utf-8"))
             if document["format"] != FORMAT:
                 raise NoBackup(f"{path} has the format {document['format']!r}; expected {FORMAT}.")
-            found = cls(**document)
-            found.require_names_inside(path)
-            return found
+            contents = cls(**document)
+            contents.require_names_inside(path)
+            return contents
         except OSError as fault:
             raise NoBackup(
                 f"{path} cannot be read ({fault.strerror}); expected the folder of a backup."
@@ -73,7 +73,7 @@ class Contents:
             raise NoBackup(f"{path} is damaged; expected the list that `manage.py backup` wrote.") from fault
 
     def require_names_inside(self, path: Path) -> None:
-        """Refuse a name that leads out of its directory: whoever changed it could write anywhere.
+        """Refuse a name that leads out of its directory, so that a changed list cannot write anywhere.
 
         Raises `NoBackup`.
         """
@@ -112,7 +112,7 @@ def digest_at(path: Path) -> str:
 
 
 def named_files() -> tuple[list[str], list[str]]:
-    """Files of the store that rows name: those that must be there, and those that can be made anew."""
+    """Files of the store that rows name: those that must be there, and those that can be made again."""
     sent = list(Submission.objects.order_by().values_list("digest", "manifest_digest").distinct())
     manifests = {digest for _, digest in sent} | set(
         GroundTruth.objects.order_by().values_list("manifest_digest", flat=True)
@@ -125,7 +125,7 @@ def named_files() -> tuple[list[str], list[str]]:
 def private_files() -> Iterator[Path]:
     """What the ground-truth directory holds: values, manifests, marks and the secret of hidden splits."""
     try:
-        found = sorted(Path(settings.GROUND_TRUTH_DIR).iterdir())
+        paths = sorted(Path(settings.GROUND_TRUTH_DIR).iterdir())
     except FileNotFoundError:
         return
     except OSError as fault:
@@ -133,8 +133,8 @@ def private_files() -> Iterator[Path]:
             f"The ground truth at {settings.GROUND_TRUTH_DIR} cannot be read ({fault.strerror}); "
             "expected to run where workers run."
         ) from fault
-    for path in found:
-        if path.name != _MADE_ANEW and path.is_file() and not path.name.startswith("tmp"):
+    for path in paths:
+        if path.name != _REMADE_FOLDER and path.is_file() and not path.name.startswith("tmp"):
             yield path
 
 
@@ -147,13 +147,13 @@ def missing_values() -> list[str]:
 
 def board_digests() -> dict[str, str]:
     """The SHA-256 of every published edition's board, as its CSV with intervals, by split and number."""
-    found = {}
+    digests = {}
     editions = Edition.objects.exclude(published_at=None).select_related("split", "ground_truth")
     for edition in editions.order_by("split", "number"):
         shown = listing.board(split=edition.split, edition=edition, viewer=AnonymousUser())
         text = formats.as_csv(tables.export(shown, address="", has_intervals=True))
-        found[f"{edition.split_id}/{edition.number}"] = hashlib.sha256(text.encode()).hexdigest()
-    return found
+        digests[f"{edition.split_id}/{edition.number}"] = hashlib.sha256(text.encode()).hexdigest()
+    return digests
 
 
 def applied_migrations() -> list[list[str]]:

@@ -26,7 +26,7 @@ _OURS_ALONE: Final = ("--no-owner", "--no-privileges")
 
 @contextmanager
 def one_moment() -> Iterator[None]:
-    """Read everything as it is now, whatever others write meanwhile. On PostgreSQL nobody waits."""
+    """Read everything as of one moment, while others may write. On PostgreSQL this blocks no one."""
     with transaction.atomic():
         if connection.vendor == "postgresql":
             with connection.cursor() as cursor:
@@ -57,7 +57,7 @@ def save(folder: Path) -> Path:
 
 
 def require_fresh(kept: Contents) -> None:
-    """Refuse a database in which somebody has worked, or of another version. Raises `NoBackup`."""
+    """Refuse a database that is in use or of another version. Raises `NoBackup`."""
     if get_user_model()._meta.db_table not in connection.introspection.table_names():
         return
     for model in (get_user_model(), Submission, GroundTruth):

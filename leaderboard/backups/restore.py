@@ -1,4 +1,4 @@
-"""Put a backup into a fresh place, and hold what came out against what went in."""
+"""Restore a backup into an empty site, and compare its digests with those of the backup."""
 
 import os
 import shutil
@@ -18,7 +18,7 @@ from leaderboard.submissions import receipts
 
 @dataclass(frozen=True)
 class Restored:
-    """What is there again: every digest held."""
+    """What was restored; every digest is the same."""
 
     contents: Contents
     n_boards: int  # boards that were compared: none where this version is later than the backup's

@@ -11,8 +11,8 @@ from leaderboard.methods.details import DETAILS, MAX_FILTER_TEXT, YES_NO, Detail
 class BadFilter(ValueError):
     """A filter has a value that it does not take. `field` is its name."""
 
-    def __init__(self, field: str, found: str, expected: str) -> None:
-        super().__init__(f"The filter '{field}' is {found[:60]!r}; expected {expected}.")
+    def __init__(self, field: str, given: str, expected: str) -> None:
+        super().__init__(f"The filter '{field}' is {given[:60]!r}; expected {expected}.")
         self.field = field
 
 
@@ -59,11 +59,11 @@ class Filters:
 
     @property
     def is_set(self) -> bool:
-        """Whether anything is asked for."""
+        """Whether any filter is set."""
         return bool(self.wanted)
 
     def admits(self, entry: Entry) -> bool:
-        """Whether the row is to be shown. It is asked for what it states, so a masked row betrays nothing."""
+        """Whether the row passes all filters, by the values that the reader sees in it."""
         return all(
             FILTERS[name].kind.admits(value, FILTERS[name].stated(entry))
             for name, value in self.wanted.items()

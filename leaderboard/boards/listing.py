@@ -17,8 +17,8 @@ from leaderboard.boards.filters import Filters
 from leaderboard.boards.rows import (
     NO_RANGES,
     Entry,
-    Place,
     Scored,
+    SortKey,
     in_ranks,
     key,
     listed,
@@ -135,7 +135,7 @@ def board(
 
     With `at` the board as it stood then, with methods told as everybody sees them now. Ranks are by published
     MiD among everything that everybody sees, whatever the filters; ties share a rank. Each method is
-    represented by the best of its standing submissions; one whose submissions were all withdrawn leaves a row
+    represented by the best of its active submissions; one whose submissions were all withdrawn leaves a row
     without values. Rows that only the viewer's own team sees carry the rank that they would have.
     `read` gives the rows that everybody sees, in `public_rows`' place. Raises `UnknownColumn`.
     """
@@ -172,10 +172,10 @@ def require_column(sort: str, *, rules: Protocol | None = None) -> None:
 
 
 def _n_left_behind(edition: Edition) -> int:
-    """Standing submissions of shown methods that another published edition of the split has scored."""
+    """Active submissions of shown methods that another published edition of the split has scored."""
     scored = Evaluation.objects.filter(status=Status.SCORED, edition__published_at__isnull=False)
     return (
-        Submission.objects.standing()
+        Submission.objects.active()
         .filter(split=edition.split_id, method__in=Method.objects.shown())
         .filter(pk__in=scored.exclude(edition=edition).values("submission"))
         .count()
@@ -236,7 +236,7 @@ def _best_of_each(
     if at is not None:
         rows = rows.filter(_finished_by(at, method="submission__method"))
     unscorable = unscorable_in(edition, split=split)
-    best: dict[UUID, tuple[Place, Entry]] = {}
+    best: dict[UUID, tuple[SortKey, Entry]] = {}
     for evaluation, scored in _with_scores(rows, edition=edition, has_ranges=at is None):
         submission = evaluation.submission
         if assuming_visible is not None and submission.method_id == assuming_visible.pk:
@@ -254,10 +254,10 @@ def _best_of_each(
             withdrawn_at=withdrawn_at,
             unscorable=unscorable.get(evaluation.submission_id, ""),
         )
-        place = key(entry.scores[PRIMARY], submission.submitted_at)
+        sort_key = key(entry.scores[PRIMARY], submission.submitted_at)
         rival = best.get(method.pk)
-        if rival is None or place < rival[0]:
-            best[method.pk] = place, entry
+        if rival is None or sort_key < rival[0]:
+            best[method.pk] = sort_key, entry
     return [entry for _, entry in best.values()]
 
 
@@ -321,13 +321,13 @@ def _attempts(
         .annotate(n=Count("pk"))
     )
     teller_of: dict[UUID | None, UUID] = {}
-    told = Counter[UUID]()
+    counts = Counter[UUID]()
     for method_id, team_id, visibility, n in rows:
         if assuming_visible is not None and method_id == assuming_visible.pk:
             visibility = assuming_visible.visibility  # noqa: PLW2901 - as if it were
         teller_of[method_id] = team_id if of_teams and visibility == Visibility.PUBLIC else method_id
-        told[teller_of[method_id]] += n
-    return {method_id: told[teller] for method_id, teller in teller_of.items()}
+        counts[teller_of[method_id]] += n
+    return {method_id: counts[teller] for method_id, teller in teller_of.items()}
 
 
 # --- what a reader's own team sees beside ----------------------------------------------------------------

@@ -13,7 +13,7 @@ from leaderboard.models import Edition, Method, Split, User
 
 
 def profile(*, method: Method, viewer: User | AnonymousUser) -> Profile:
-    """What this reader is told of a method that is visible to them: of an anonymous one little."""
+    """The profile of a visible method as this reader sees it: masked if it is anonymous."""
     return profile_of(method, is_masked=not method.is_named_for(viewer))
 
 
@@ -25,7 +25,7 @@ class Result:
     edition: Edition
     entry: Entry
     n_ranked: int
-    attempts: tuple[Attempt, ...]  # its standing, scored submissions, the newest first
+    attempts: tuple[Attempt, ...]  # its active, scored submissions, the newest first
     neighbours: tuple[Entry, ...]  # of the rows that everybody sees, up to two of the nearest rank
 
 
@@ -36,7 +36,7 @@ def results(
 
     `splits` are those of `snapshots.splits()`, where they are at hand.
     """
-    found = []
+    per_split = []
     for split, drawn in snapshots.shown_on(splits if splits is not None else snapshots.splits()):
         edition = split.published_edition
         entries = listing.with_own(drawn.entries, split=split, edition=edition, viewer=viewer)
@@ -51,8 +51,8 @@ def results(
         own = snapshots.attempts(edition, methods=Method.objects.filter(pk=method.pk)) if not is_shown else ()
         attempts = own or tuple(each for each in drawn.attempts if each.method_id == method.pk)
         neighbours = _neighbours(entry, drawn.entries)
-        found.append(Result(split, edition, entry, n_ranked, attempts, neighbours))
-    return tuple(found)
+        per_split.append(Result(split, edition, entry, n_ranked, attempts, neighbours))
+    return tuple(per_split)
 
 
 def _neighbours(entry: Entry, rows: Sequence[Entry]) -> tuple[Entry, ...]:
@@ -62,6 +62,6 @@ def _neighbours(entry: Entry, rows: Sequence[Entry]) -> tuple[Entry, ...]:
     if value is None:
         return ()
     others.sort(key=lambda row: row.scores[PRIMARY] or 0.0)
-    place = sum((row.scores[PRIMARY] or 0.0) < value for row in others)
-    first = min(max(place - 1, 0), max(len(others) - 2, 0))
+    n_better = sum((row.scores[PRIMARY] or 0.0) < value for row in others)
+    first = min(max(n_better - 1, 0), max(len(others) - 2, 0))
     return tuple(others[first : first + 2])

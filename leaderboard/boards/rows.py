@@ -27,13 +27,13 @@ from leaderboard.models.benchmark import SINCE_EVER
 
 ANONYMOUS_TEAM = "Anonymous"
 OTHER_REASON = "other"
-# Of why a file cannot be scored in another edition, what everybody is told: it is about that edition.
-_REASONS_TOLD = ("missing-keys", "unknown-keys", "undefined-error")
+# Why a file cannot be scored in another edition, if the reason is about that edition: everybody sees it.
+_SHOWN_REASONS = ("missing-keys", "unknown-keys", "undefined-error")
 
 
 @dataclass(frozen=True)
 class Profile:
-    """What a reader is told of a method: everything, or what an anonymous one shows."""
+    """The fields of a method that a reader sees: all of them, or those of an anonymous method."""
 
     name: str
     team: str
@@ -100,7 +100,7 @@ class Entry:
 
     @property
     def id(self) -> str:
-        """The name of the row that nobody else can take: a method's id, or `published:` and a slug."""
+        """The unique name of the row: a method's id, or `published:` and a slug."""
         return str(self.method_id) if self.method_id else f"published:{self.slug}"
 
     @property
@@ -171,10 +171,10 @@ def printed_decimals(values: Iterable[float | None]) -> int:
 
 def named(profile: Profile) -> dict[str, Any]:
     """The fields of a row that say what the method is."""
-    said = {
+    fields = {
         name: getattr(profile, name) for name in ("team", "description", "paper_url", "code_url", "details")
     }
-    return {"method": profile.name, **said}
+    return {"method": profile.name, **fields}
 
 
 def submitted_entry(
@@ -215,7 +215,7 @@ def public_reason(problems: Iterable[Mapping[str, str]]) -> str:
     'other'
     """
     codes = (problem["code"] for problem in problems)
-    return next((code for code in codes if code in _REASONS_TOLD), OTHER_REASON)
+    return next((code for code in codes if code in _SHOWN_REASONS), OTHER_REASON)
 
 
 # --- their values ----------------------------------------------------------------------------------------
@@ -255,7 +255,7 @@ def scored_in(
 ) -> Mapping[UUID, Scored]:
     """Values and intervals of every evaluation in an edition, or of these: one query.
 
-    With `ranges_in(edition)` also the rank ranges of the entries that stand now.
+    With `ranges_in(edition)` also the rank ranges of the present entries.
     """
     rules, nothing = edition.rules, [None] * len(edition.rules.score_names)
     rows = Score.objects.filter(evaluation__edition=edition)
@@ -268,7 +268,7 @@ def scored_in(
         name = score_name(metric, ttc_range)
         pair = ranges.get(str(pk), nothing)[rules.score_names.index(name)] or (None, None)
         cells.setdefault(pk, {})[name] = value, ConfidenceInterval(low, high, *pair)
-    return {pk: _scored(found, rules) for pk, found in cells.items()}
+    return {pk: _scored(row_cells, rules) for pk, row_cells in cells.items()}
 
 
 def ranges_in(edition: Edition) -> KeptRanges:
@@ -278,19 +278,19 @@ def ranges_in(edition: Edition) -> KeptRanges:
 
 def placed(entry: Entry, rank: int | None) -> Entry:
     """The row with its rank. A range that does not hold it is of the board before, and left out."""
-    found = entry.intervals.get(PRIMARY, ConfidenceInterval())
-    if rank is None or found.rank_low is None or found.rank_high is None:
+    interval = entry.intervals.get(PRIMARY, ConfidenceInterval())
+    if rank is None or interval.rank_low is None or interval.rank_high is None:
         return replace(entry, rank=rank)
-    if found.rank_low <= rank <= found.rank_high:
+    if interval.rank_low <= rank <= interval.rank_high:
         return replace(entry, rank=rank)
-    unplaced = replace(found, rank_low=None, rank_high=None)
+    unplaced = replace(interval, rank_low=None, rank_high=None)
     return replace(entry, rank=rank, intervals={**entry.intervals, PRIMARY: unplaced})
 
 
-Place = tuple[bool, float, datetime]
+SortKey = tuple[bool, float, datetime]
 
 
-def key(value: float | None, submitted_at: datetime) -> Place:
+def key(value: float | None, submitted_at: datetime) -> SortKey:
     """Of a method's submissions, the better first: a value before none, lower before higher, then earlier."""
     return (value is None, value or 0.0, submitted_at)
 

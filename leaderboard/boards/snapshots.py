@@ -38,7 +38,7 @@ from leaderboard.models.methods import MethodQuerySet
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """One standing submission of a method, with its overall scores."""
+    """One active submission of a method, with its overall scores."""
 
     method_id: UUID
     submission_id: UUID
@@ -75,12 +75,12 @@ def splits() -> list[Split]:
 
 
 def splits_of(request: HttpRequest) -> list[Split]:
-    """The same, read once a request."""
-    found: list[Split] | None = getattr(request, "splits", None)
-    if found is None:
-        found = splits()
-        request.splits = found  # type: ignore[attr-defined]  # our own, as `user` is Django's
-    return found
+    """The splits as in `splits`, read once a request."""
+    cached: list[Split] | None = getattr(request, "splits", None)
+    if cached is None:
+        cached = splits()
+        request.splits = cached  # type: ignore[attr-defined]  # our own, as `user` is Django's
+    return cached
 
 
 def site_line_of(splits: Sequence[Split], *, now: datetime) -> str:
@@ -126,7 +126,7 @@ board = partial(listing.board, read=_public_rows)
 
 
 def _as_of(split: Split, edition: Edition | None, at: datetime) -> tuple[Entry, ...]:
-    """What everybody saw at that time."""
+    """The rows that everybody saw at that time."""
 
     def rows() -> CurrentBoard:
         return CurrentBoard(listing.public_rows(split=split, edition=edition, at=at))
@@ -147,7 +147,7 @@ def shown_on(rows: Sequence[Split]) -> list[tuple[Split, CurrentBoard]]:
 
 
 def _kept(key: str, read: Callable[[], CurrentBoard], *, cache: str) -> CurrentBoard:
-    """What is kept under a key, else what is read now: never older than the number in the key."""
+    """The cached board of a key, else read now. The key has the board's number, so a hit is current."""
     body: bytes | None = caches[cache].get(key)
     if body is None:
         with _reading:
@@ -181,7 +181,7 @@ def _repeatable_read() -> Iterator[None]:
 
 
 def attempts(edition: Edition, *, methods: MethodQuerySet) -> tuple[Attempt, ...]:
-    """The standing, scored submissions of these methods, the newest first."""
+    """The active, scored submissions of these methods, the newest first."""
     rows = Score.objects.filter(
         evaluation__edition=edition,
         evaluation__status=Status.SCORED,
@@ -193,14 +193,14 @@ def attempts(edition: Edition, *, methods: MethodQuerySet) -> tuple[Attempt, ...
         *("submission__method_id", "submission__method__visibility"),
         *("submission_id", "submission__submitted_at"),
     )
-    found: dict[UUID, Attempt] = {}
+    by_id: dict[UUID, Attempt] = {}
     values: dict[UUID, dict[str, float | None]] = {}
     for method_id, visibility, pk, sent_at, metric, value in rows.values_list(
         *(f"evaluation__{column}" for column in columns), "metric", "value"
     ):
-        if pk not in found:
+        if pk not in by_id:
             at = days.truncate_to_day(sent_at, is_masked=visibility == Visibility.ANONYMOUS)
             values[pk] = dict.fromkeys(edition.rules.overall_names)
-            found[pk] = Attempt(method_id, pk, at, values[pk])
+            by_id[pk] = Attempt(method_id, pk, at, values[pk])
         values[pk][metric] = value
-    return tuple(sorted(found.values(), key=lambda a: (a.at, a.submission_id.int), reverse=True))
+    return tuple(sorted(by_id.values(), key=lambda a: (a.at, a.submission_id.int), reverse=True))

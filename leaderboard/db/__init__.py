@@ -1,4 +1,4 @@
-"""The database beside the ORM: its clock.
+"""The database's clock, next to the ORM.
 
 Every room may import this one; it imports none.
 """

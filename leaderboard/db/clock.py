@@ -15,7 +15,7 @@ def after(seconds: float) -> CombinedExpression:
 
 
 def database_now() -> datetime:
-    """What the database's clock says, for whoever compares with times that were written by it."""
+    """The time of the database's clock, to compare with times that it wrote."""
     row = Split.objects.annotate(now=Now()).values_list("now", flat=True).first()
     # Only a database without a single split, which no migrated one is, cannot be asked in this way.
     return timezone.now() if row is None else row

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 """How long a process may take to end by itself, and to open its port."""
 MAX_QUICK_DEATHS = 5
 QUICK_S = 10.0
@@ -80,7 +80,7 @@ async def _end(child: asyncio.subprocess.Process) -> None:
         with contextlib.suppress(ProcessLookupError):
             child.terminate()
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(child.wait(), timeout=PATIENCE_S)
+            await asyncio.wait_for(child.wait(), timeout=TIMEOUT_S)
     # Its own children (a worker's readers) outlive a process that was killed.
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(child.pid, signal.SIGKILL)
@@ -100,7 +100,7 @@ def port_is_free(host: str, port: int) -> bool:
 
 async def _listening(host: str, port: int) -> None:
     """Return once something accepts connections there. Raises `TimeoutError`."""
-    async with asyncio.timeout(PATIENCE_S):
+    async with asyncio.timeout(TIMEOUT_S):
         while True:
             try:
                 _, writer = await asyncio.open_connection(host, port)

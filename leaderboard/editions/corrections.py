@@ -1,6 +1,6 @@
 """Corrections: re-score everything in a new edition, look, publish it at once, and roll back.
 
-A correction is a new edition (ground truth × protocol) in which every standing submission is evaluated anew.
+A correction is a new edition (ground truth × protocol) in which every active submission is evaluated again.
 Publishing it moves one pointer; nothing that was ever published is changed.
 """
 
@@ -60,7 +60,7 @@ def open_edition(
     digest: str | None = None,
     protocol: str | None = None,
 ) -> Edition:
-    """Open an edition beside the published one and queue every standing submission for it.
+    """Open an edition next to the published one and queue every active submission for it.
 
     The ground truth is read from `path`, or is the imported one of that `digest`, or stays; the protocol
     stays unless given. Asked again for the same, it goes on with what is there: nothing is queued twice.
@@ -113,13 +113,13 @@ def _imported(split: Split, digest: str | None) -> GroundTruth:
 
 
 def active_submissions(edition: Edition) -> SubmissionQuerySet:
-    """Every standing submission of an edition's split, in the order in which they came."""
-    rows = Submission.objects.standing().filter(split=edition.split_id)
+    """The active submissions of an edition's split, in the order in which they came."""
+    rows = Submission.objects.active().filter(split=edition.split_id)
     return rows.select_related("method__team").order_by("submitted_at")
 
 
 def queue_active(edition: Edition) -> int:
-    """Queue every standing submission that this edition has no evaluation of. Returns how many that were.
+    """Queue every active submission that this edition has no evaluation of. Returns their number.
 
     The caller holds the split's row, so that no new submission slips between.
     """
@@ -146,21 +146,21 @@ def progress(edition: Edition) -> RescoringProgress:
         first=Min("started_at"),
     )
     first = counts.pop("first")
-    found = RescoringProgress(**counts, rate_per_s=None, left_s=None)
-    if first is None or not found.n_done or not found.n_waiting:
-        return found
-    rate_per_s = found.n_done / max((clock.database_now() - first).total_seconds(), 0.001)
-    return replace(found, rate_per_s=rate_per_s, left_s=found.n_waiting / rate_per_s)
+    so_far = RescoringProgress(**counts, rate_per_s=None, left_s=None)
+    if first is None or not so_far.n_done or not so_far.n_waiting:
+        return so_far
+    rate_per_s = so_far.n_done / max((clock.database_now() - first).total_seconds(), 0.001)
+    return replace(so_far, rate_per_s=rate_per_s, left_s=so_far.n_waiting / rate_per_s)
 
 
 def unfinished(edition: Edition) -> list[Submission]:
-    """Standing submissions of the split that this edition has neither scored nor rejected."""
+    """Active submissions of the split that this edition has neither scored nor rejected."""
     done = Evaluation.objects.filter(edition=edition, status__in=[Status.SCORED, Status.REJECTED])
     return list(active_submissions(edition).exclude(pk__in=done.values("submission")))
 
 
 def newly_rejected(edition: Edition) -> list[Submission]:
-    """Standing submissions that the board scores and this edition rejects: publishing it takes them off."""
+    """Active submissions that the board scores and this edition rejects: publishing it takes them off."""
     here = Evaluation.objects.filter(edition=edition, status=Status.REJECTED)
     board = Evaluation.objects.filter(edition=edition.split.published_edition_id, status=Status.SCORED)
     return list(
@@ -290,18 +290,18 @@ def _reason(text: str) -> str:
 
 
 def _left_out_sentence(edition: Edition, waiting: Sequence[Submission], losing: Sequence[Submission]) -> str:
-    said = []
+    sentences = []
     if waiting:
-        said.append(
+        sentences.append(
             f"{edition} is not finished: {counted(len(waiting), 'submission is', 'submissions are')} neither "
             f"scored nor rejected: {_named(waiting)}. Wait, retry them, or confirm that they are left out."
         )
     if losing:
-        said.append(
+        sentences.append(
             f"{edition} rejects {counted(len(losing), 'entry', 'entries')} that the board scores: "
             f"{_named(losing)}. Confirm that they are left out, or correct the ground truth."
         )
-    return " ".join(said)
+    return " ".join(sentences)
 
 
 def _named(rows: Sequence[Submission]) -> str:

@@ -21,18 +21,18 @@ def parse(text: str, *, field: str = "") -> datetime:
     A time without a zone is refused, and so is one that the clocks of the place skip or show twice.
     """
     text = text.strip()
-    found = _FORM.fullmatch(text)
-    if found is None:
+    match = _FORM.fullmatch(text)
+    if match is None:
         raise _refused(f"{text[:60]!r} is not a date with a time", f"one like {EXAMPLE}", field)
-    if not found[3]:
+    if not match[3]:
         raise _refused(f"{text[:60]!r} has no time zone", f"{_ZONES} after the time", field)
     try:
-        local = datetime.fromisoformat(f"{found[1]} {found[2]}")
+        local = datetime.fromisoformat(f"{match[1]} {match[2]}")
     except ValueError:
         raise _refused(
-            f"{found[1]} {found[2]} is not in the calendar", f"one like {EXAMPLE}", field
+            f"{match[1]} {match[2]} is not in the calendar", f"one like {EXAMPLE}", field
         ) from None
-    zone = _zone(found[3], field)
+    zone = _zone(match[3], field)
     try:
         moments = {local.replace(tzinfo=zone, fold=fold).astimezone(UTC) for fold in (0, 1)}
         there = {moment for moment in moments if moment.astimezone(zone).replace(tzinfo=None) == local}
@@ -40,7 +40,7 @@ def parse(text: str, *, field: str = "") -> datetime:
         raise _refused(f"{text[:60]!r} is outside of the calendar", f"one like {EXAMPLE}", field) from None
     if len(there) != 1:
         how = "occurs twice" if there else "does not occur"
-        what = f"The time {found[1]} {found[2]} {how} in {found[3]}, because the clocks change then"
+        what = f"The time {match[1]} {match[2]} {how} in {match[3]}, because the clocks change then"
         raise _refused(what, "an offset like +01:00, or UTC", field)
     return there.pop()
 
@@ -72,5 +72,5 @@ def _zone(name: str, field: str) -> tzinfo:
     raise _refused(f"There is no time zone {name[:40]!r}", _ZONES, field)
 
 
-def _refused(found: str, expected: str, field: str) -> Refused:
-    return Refused("bad-value", f"{found}; expected {expected}.", field=field)
+def _refused(fault: str, expected: str, field: str) -> Refused:
+    return Refused("bad-value", f"{fault}; expected {expected}.", field=field)

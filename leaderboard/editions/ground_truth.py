@@ -57,7 +57,7 @@ def import_truth(
 
 
 def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> GroundTruth:
-    """Validate a ground truth and keep it immutably. The same file again is answered with the row it has.
+    """Validate a ground truth and keep it immutably. Returns the existing row for the same file.
 
     Raises `evaluator.Rejected` if the file is at fault or has no sequence of the published manifest,
     `Refused` if the split is unknown or the ground truth belongs to another one.
@@ -127,21 +127,20 @@ def _keep_comparison(old: GroundTruth, new: GroundTruth, counts: Comparison) -> 
     TruthComparison.objects.update_or_create(old=old, new=new, defaults=dataclasses.asdict(counts))
 
 
-def uncompared(*, held: Collection[str]) -> list[tuple[GroundTruth, GroundTruth]]:
-    """The board's ground truth and that of an edition beside it, where nobody has counted what differs.
+def uncompared(*, readable_truths: Collection[str]) -> list[tuple[GroundTruth, GroundTruth]]:
+    """Pairs of the board's ground truth and that of an edition in preparation that are not compared yet.
 
-    So it is after the board has changed while an edition was being prepared. Only pairs that are both among
-    the digests `held`.
+    They arise when the board changes during the preparation. `readable_truths` has the digests of both.
     """
-    beside = Edition.objects.filter(
+    editions = Edition.objects.filter(
         published_at=None,
         discarded_at=None,
-        ground_truth__in=held,
-        split__published_edition__ground_truth__in=held,
+        ground_truth__in=readable_truths,
+        split__published_edition__ground_truth__in=readable_truths,
     ).select_related("ground_truth", "split__published_edition__ground_truth")
     pairs = {
         (edition.split.published_edition.ground_truth, edition.ground_truth)
-        for edition in beside
+        for edition in editions
         if edition.split.published_edition is not None
     }
     return [
@@ -152,7 +151,7 @@ def uncompared(*, held: Collection[str]) -> list[tuple[GroundTruth, GroundTruth]
 
 
 def count_changes(old: GroundTruth, new: GroundTruth) -> None:
-    """Count what differs between two ground truths, for whoever asks later. Raises as `load` does."""
+    """Count the differences between two ground truths and keep the counts. Raises as `load` does."""
     _keep_comparison(old, new, compare(truth_values.load(old.digest), truth_values.load(new.digest)))
 
 
@@ -170,7 +169,7 @@ def new_edition(
     actor: User | None,
 ) -> Edition:
     """The next edition of a split whose row the caller has locked, with decimals and unit of this moment."""
-    found = units_of(row)
+    units = units_of(row)
     last = split.editions.aggregate(last=Max("number"))["last"] or 0
     edition = Edition.objects.create(
         split=split,
@@ -178,8 +177,8 @@ def new_edition(
         ground_truth=row,
         protocol=protocol,
         decimals=split.decimals,
-        unit=found.kind,
-        n_units=None if found.kind == RECORDING else len(found),
+        unit=units.kind,
+        n_units=None if units.kind == RECORDING else len(units),
         opened_at=now,
         opened_by=actor,
     )

@@ -116,17 +116,17 @@ def change_of_truth(
     if compared is None:
         compared = list(TruthComparison.objects.between(before, after).order_by("pk"))
     pair = {before.pk, after.pk}
-    found = next((row for row in reversed(compared) if {row.old_id, row.new_id} == pair), None)
-    if found is None:
+    comparison = next((row for row in reversed(compared) if {row.old_id, row.new_id} == pair), None)
+    if comparison is None:
         return None
-    added, removed = found.n_added, found.n_removed
-    if found.old_id == after.pk:
+    added, removed = comparison.n_added, comparison.n_removed
+    if comparison.old_id == after.pk:
         added, removed = removed, added
-    return TruthChange(added, removed, found.n_changed, found.n_renumbered)
+    return TruthChange(added, removed, comparison.n_changed, comparison.n_renumbered)
 
 
 def rescored(submission: Submission) -> Rescored | None:
-    """What the last change of the board did to a standing submission; None if it came after that."""
+    """What the last change of the board did to an active submission; None if it came after that."""
     publication = latest_change(submission.split)
     if publication is None or publication.at <= submission.submitted_at or submission.withdrawn_at:
         return None

@@ -59,13 +59,13 @@ def _by_recording(old: evaluator.GroundTruth, new: evaluator.GroundTruth) -> lis
     before = np.full(new.n_sequences, np.nan)
     before[is_common] = old.ttc_s[rows[is_common]]
     change_s = np.where(is_common, np.abs(new.ttc_s - before), 0.0)
-    found = []
+    changes = []
     for name in sorted({*names.tolist(), *names_gone.tolist()}):
         here = names == name
         changed = here & is_common & (change_s > 0)
         n_added, n_removed = int(np.sum(here & ~is_common)), int(np.sum(names_gone == name))
         if n_added or n_removed or changed.any():
-            found.append(
+            changes.append(
                 {
                     "recording": name,
                     "n_added": n_added,
@@ -77,6 +77,6 @@ def _by_recording(old: evaluator.GroundTruth, new: evaluator.GroundTruth) -> lis
                 }
             )
     return sorted(
-        found,
+        changes,
         key=lambda row: (-row["n_added"] - row["n_removed"], -row["largest_change_s"], row["recording"]),
     )

@@ -14,7 +14,7 @@ from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Publication, Split, User
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9-]{0,31}", re.ASCII)
-# What stands at the same place in addresses of maintainers' pages.
+# Names that mean something else in addresses of maintainers' pages.
 _RESERVED: Final = frozenset(
     {"add", "announcement", "audit", "actions", "pages", "published", "queue", "quotas", "splits", "teams"}
 )
@@ -89,9 +89,9 @@ def add_split(
 
 
 def _sharing(name: str) -> Split:
-    """The split whose ground truth is to be shared, which stays as it is until the transaction ends."""
-    found = Split.objects.select_for_update(no_key=True).filter(pk=name).first()
-    if found is None or found.published_edition_id is None or found.same_truth_as_id is not None:
+    """The split whose ground truth is to be shared, locked until the transaction ends."""
+    split = Split.objects.select_for_update(no_key=True).filter(pk=name).first()
+    if split is None or split.published_edition_id is None or split.same_truth_as_id is not None:
         able = Split.objects.filter(same_truth_as=None).exclude(published_edition=None)
         known = ", ".join(able.values_list("name", flat=True)) or "none, because none has ground truth yet"
         raise Refused(
@@ -99,7 +99,7 @@ def _sharing(name: str) -> Split:
             f"There is no split {name[:60]!r} with ground truth of its own; expected one of: {known}.",
             field="same_truth_as",
         )
-    return found
+    return split
 
 
 def _publish_like(other: Split, split: Split, *, now: datetime, actor: User | None) -> None:

@@ -95,7 +95,7 @@ def _problems(document: Mapping[str, Any], splits: Collection[str], *, latest_ye
     for name, kind in kinds.items():
         if name not in sound:
             expected = "an object" if kind is dict else "a list"
-            yield f"/{name}: {_found(document, name)}; expected {expected}."
+            yield f"/{name}: {_kind_at(document, name)}; expected {expected}."
     if "source" in sound:
         yield from _of_source(document["source"], latest_year=latest_year)
     columns = document["columns"] if "columns" in sound else None
@@ -118,7 +118,7 @@ def _of_source(source: Mapping[str, Any], *, latest_year: int) -> Iterator[str]:
     year = source.get("year")
     if isinstance(year, bool) or not isinstance(year, int) or not 1950 <= year <= latest_year:
         # A paper in print may have the year after this one.
-        yield f"/source/year: {_found(source, 'year')}; expected a year from 1950 to {latest_year}."
+        yield f"/source/year: {_kind_at(source, 'year')}; expected a year from 1950 to {latest_year}."
 
 
 def _of_method(method: Any, where: str) -> Iterator[str]:
@@ -127,16 +127,16 @@ def _of_method(method: Any, where: str) -> Iterator[str]:
         return
     slug = method.get("slug")
     if not isinstance(slug, str) or not _SLUG.fullmatch(slug):
-        found = _found(method, "slug")
-        yield f"{where}/slug: {found}; expected small letters, digits and hyphens, at most 64."
+        kind = _kind_at(method, "slug")
+        yield f"{where}/slug: {kind}; expected small letters, digits and hyphens, at most 64."
     yield from _text(method, "name", where, limit=_MAX_NAME)
     yield from _text(method, "description", where, limit=_MAX_DESCRIPTION, is_required=False)
     yield from _text(method, "hardware", where, limit=_LIMITS["hardware"], is_required=False)
     if not isinstance(method.get("uses_nerf", False), bool):
-        yield f"{where}/uses_nerf: {_found(method, 'uses_nerf')}; expected true or false."
+        yield f"{where}/uses_nerf: {_kind_at(method, 'uses_nerf')}; expected true or false."
     latency_ms = method.get("latency_ms")
     if latency_ms is not None and not (_is_number(latency_ms) and 0 < latency_ms < _MAX_LATENCY_MS):
-        yield f"{where}/latency_ms: {_found(method, 'latency_ms')}; expected milliseconds above 0, or null."
+        yield f"{where}/latency_ms: {_kind_at(method, 'latency_ms')}; expected milliseconds above 0, or null."
     elif latency_ms is not None and not method.get("hardware"):
         yield f"{where}/hardware: nothing; expected what the latency was measured on."
 
@@ -174,8 +174,8 @@ def _of_row(
     if slug not in slugs:
         yield f"{where}: no method of this slug under /methods; expected one of those there."
     if not isinstance(values, list) or len(values) != n_columns:
-        found = f"{len(values)} values" if isinstance(values, list) else _kind(values)
-        yield f"{where}: {found}; expected a list of {n_columns}, one for each of the columns."
+        length = f"{len(values)} values" if isinstance(values, list) else _kind(values)
+        yield f"{where}: {length}; expected a list of {n_columns}, one for each of the columns."
         return
     for i, value in enumerate(values):
         if value is not None and not (_is_number(value) and value >= 0):
@@ -194,7 +194,7 @@ def _text(
 ) -> Iterator[str]:
     text = holder.get(name, "")
     if not isinstance(text, str) or (is_required and not text.strip()):
-        yield f"{where}/{name}: {_found(holder, name)}; expected a text."
+        yield f"{where}/{name}: {_kind_at(holder, name)}; expected a text."
     elif len(text) > limit:
         yield f"{where}/{name}: {len(text)} characters; expected at most {limit}."
     elif "\x00" in text or any(0xD800 <= ord(character) < 0xE000 for character in text):
@@ -216,7 +216,7 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and -math.inf < value < math.inf
 
 
-def _found(holder: Mapping[str, Any], name: str) -> str:
+def _kind_at(holder: Mapping[str, Any], name: str) -> str:
     return _kind(holder[name]) if name in holder else "nothing"
 
 

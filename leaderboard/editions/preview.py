@@ -18,7 +18,7 @@ ABSENT = "ABSENT"  # not evaluated in that edition
 
 @dataclass(frozen=True)
 class Change:
-    """One standing submission in the published edition and in the one in preparation.
+    """One active submission in the published edition and in the one in preparation.
 
     Ranks are those of the boards, and given for the submission that represents its method there.
     """
@@ -97,7 +97,7 @@ class Preview:
 
     @property
     def n_changed(self) -> int:
-        """Entries of which anything changes."""
+        """Entries that change in any way."""
         return sum(change.is_changed for change in self.changes)
 
     @property
@@ -138,7 +138,7 @@ def preview(edition: Edition) -> Preview:
     )
 
 
-def rows(found: Preview) -> list[dict[str, Any]]:
+def rows(edition_preview: Preview) -> list[dict[str, Any]]:
     """The preview as flat rows for CSV and JSON: one for each submission, with its `columns`.
 
     `n_renumbered` is of the edition and the same in all rows: sequences with another anno_id than before.
@@ -152,36 +152,36 @@ def rows(found: Preview) -> list[dict[str, Any]]:
             "new_status": change.new_status,
             "old_rank": change.old_rank,
             "new_rank": change.new_rank,
-            **{f"old_{name}": change.old.get(name) for name in found.names},
-            **{f"new_{name}": change.new.get(name) for name in found.names},
+            **{f"old_{name}": change.old.get(name) for name in edition_preview.names},
+            **{f"new_{name}": change.new.get(name) for name in edition_preview.names},
             **{f"delta_{name}": value for name, value in change.delta.items()},
             "reason": change.problems[0]["message"] if change.problems else "",
-            "n_renumbered": found.truth.n_renumbered if found.truth else None,
+            "n_renumbered": edition_preview.truth.n_renumbered if edition_preview.truth else None,
         }
-        for change in found.changes
+        for change in edition_preview.changes
     ]
 
 
-def document(found: Preview) -> dict[str, Any]:
+def document(edition_preview: Preview) -> dict[str, Any]:
     """The preview as one document for programs: totals, progress, and the flat rows."""
-    truth, progress = found.truth, found.progress
+    truth, progress = edition_preview.truth, edition_preview.progress
     return {
-        "edition": found.edition.number,
-        "replaces": found.replaces,
+        "edition": edition_preview.edition.number,
+        "replaces": edition_preview.replaces,
         "n_added": truth.n_added if truth else None,
         "n_removed": truth.n_removed if truth else None,
         "n_changed_sequences": truth.n_changed if truth else None,
         "n_renumbered": truth.n_renumbered if truth else None,
-        "n_changed": found.n_changed,
-        "n_moved": found.n_moved,
-        "n_newly_rejected": found.n_newly_rejected,
+        "n_changed": edition_preview.n_changed,
+        "n_moved": edition_preview.n_moved,
+        "n_newly_rejected": edition_preview.n_newly_rejected,
         "progress": {
             **asdict(progress),
             "n_done": progress.n_done,
             "n_waiting": progress.n_waiting,
             "percent": progress.percent,
         },
-        "changes": rows(found),
+        "changes": rows(edition_preview),
     }
 
 
@@ -197,8 +197,8 @@ class _Side:
     def values(self, submission: Submission) -> Mapping[str, float | None]:
         """The values of a submission, None where it has none."""
         evaluation = self.evaluations.get(submission.pk)
-        found = self.scores.get(evaluation.pk) if evaluation else None
-        return found or dict.fromkeys(self.edition.rules.score_names)
+        scores = self.scores.get(evaluation.pk) if evaluation else None
+        return scores or dict.fromkeys(self.edition.rules.score_names)
 
     def status(self, submission: Submission) -> str:
         """The state of a submission's evaluation."""

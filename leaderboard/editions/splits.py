@@ -103,23 +103,23 @@ def import_published(
     """
     require_maintainer(actor, to="add rows of papers")
     rows = papers.rows_of(document, splits=Split.objects.values_list("name", flat=True), now=now)
-    found: dict[str, list[str]] = {"added": [], "replaced": [], "unchanged": []}
+    names_by_outcome: dict[str, list[str]] = {"added": [], "replaced": [], "unchanged": []}
     with transaction.atomic():
         for row in rows:
             outcome = _import_row(row, now=now, is_replacing=is_replacing)
-            found[outcome].append(f"{row['split_id']}/{row['slug']}")
+            names_by_outcome[outcome].append(f"{row['split_id']}/{row['slug']}")
         split_ids = sorted({row["split_id"] for row in rows})
-        if found["added"] or found["replaced"]:
+        if names_by_outcome["added"] or names_by_outcome["replaced"]:
             audit.record(
                 verb="imported",
                 noun="PublishedResult",
                 noun_id=str(rows[0]["source_url"])[:80],
                 actor=actor,
-                details={"added": found["added"], "replaced": found["replaced"]},
+                details={"added": names_by_outcome["added"], "replaced": names_by_outcome["replaced"]},
             )
             for split_id in split_ids:
                 board_versions.bump(split_id)
-    return Imported(**{outcome: tuple(names) for outcome, names in found.items()})
+    return Imported(**{outcome: tuple(names) for outcome, names in names_by_outcome.items()})
 
 
 def remove_published(
@@ -132,10 +132,10 @@ def remove_published(
     require_maintainer(actor, to="remove rows of papers")
     reason = clean_text("reason", reason, limit=MAX_REASON)
     with transaction.atomic():
-        standing = PublishedResult.objects.select_for_update(no_key=True).filter(replaced_at=None)
-        row = standing.filter(split=split_name, slug=slug).first()
+        current = PublishedResult.objects.select_for_update(no_key=True).filter(replaced_at=None)
+        row = current.filter(split=split_name, slug=slug).first()
         if row is None:
-            known = ", ".join(sorted(standing.filter(split=split_name).values_list("slug", flat=True)))
+            known = ", ".join(sorted(current.filter(split=split_name).values_list("slug", flat=True)))
             raise Refused(
                 "bad-value",
                 f"The board of {split_name[:80]!r} quotes no row {slug[:80]!r}; "
@@ -162,8 +162,8 @@ def quoted() -> QuerySet[PublishedResult]:
 
 def _import_row(row: Mapping[str, Any], *, now: datetime, is_replacing: bool) -> str:
     """Add or replace one row. Returns which of the two was done, or that it is unchanged."""
-    standing = PublishedResult.objects.select_for_update(no_key=True).filter(replaced_at=None)
-    there = standing.filter(split=row["split_id"], slug=row["slug"]).first()
+    current = PublishedResult.objects.select_for_update(no_key=True).filter(replaced_at=None)
+    there = current.filter(split=row["split_id"], slug=row["slug"]).first()
     if there is not None:
         changed = sorted(name for name, value in row.items() if getattr(there, name) != value)
         if not changed:

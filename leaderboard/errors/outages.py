@@ -26,7 +26,7 @@ class Outage:
 
     @property
     def headers(self) -> dict[str, str]:
-        """What goes with the answer."""
+        """The headers of the answer."""
         return {"Retry-After": str(self.retry_after_s)}
 
 

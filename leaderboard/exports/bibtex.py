@@ -30,11 +30,11 @@ def references(entries: Iterable[Entry], *, of_board: str = "") -> Iterator[str]
     yield of_benchmark()
     if of_board:
         yield of_board
-    found = {benchmark_key(): ""}
+    bibtex_by_key = {benchmark_key(): ""}
     for entry in entries:
         if entry.withdrawn_at is None and (entry.source_title or entry.paper_url):
-            found.setdefault(key_of(entry), of_entry(entry))
-    yield from filter(None, found.values())
+            bibtex_by_key.setdefault(key_of(entry), of_entry(entry))
+    yield from filter(None, bibtex_by_key.values())
 
 
 @lru_cache(maxsize=1)

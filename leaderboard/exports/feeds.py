@@ -26,7 +26,7 @@ _BEGINNING: Final = datetime(2023, 9, 4, tzinfo=UTC)
 
 
 def is_news(entry: Entry) -> bool:
-    """Whether a row is told of: one that somebody submitted, and that still stands."""
+    """Whether a row is in the feed: it was submitted and is not withdrawn."""
     return entry.kind == "submission" and entry.withdrawn_at is None
 
 

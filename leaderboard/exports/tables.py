@@ -38,7 +38,7 @@ def team_of(entry: Entry) -> str:
 
 
 def mark_of(entry: Entry) -> str:
-    """What is said of a row of one's own that others do not see as it is; nothing of any other row."""
+    """The note on a row of one's own that others see differently; empty for any other row."""
     return layouts.mark_of(visibility=entry.visibility, pseudonym=entry.pseudonym)
 
 
@@ -115,14 +115,14 @@ def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
     }
     if has_intervals:
         for name in entry.scores:
-            found = entry.intervals.get(name, ConfidenceInterval())
-            row[f"{name}_low"] = format_rounded(found.low, decimals=entry.decimals, missing="")
-            row[f"{name}_high"] = format_rounded(found.high, decimals=entry.decimals, missing="")
+            interval = entry.intervals.get(name, ConfidenceInterval())
+            row[f"{name}_low"] = format_rounded(interval.low, decimals=entry.decimals, missing="")
+            row[f"{name}_high"] = format_rounded(interval.high, decimals=entry.decimals, missing="")
     return row
 
 
 def latex_row(entry: Entry) -> str:
-    """One row as it stands in the LaTeX table of its board: all scores, without intervals."""
+    """One row of the LaTeX table of its board: all scores, without intervals."""
     return layouts.latex_row(_layout_row(entry, columns=tuple(entry.scores), has_intervals=False))
 
 
@@ -137,11 +137,11 @@ def _layout_row(entry: Entry, *, columns: Sequence[str], has_intervals: bool) ->
 
 
 def _cell(entry: Entry, name: str, *, has_interval: bool) -> layouts.Cell:
-    found = entry.intervals.get(name, ConfidenceInterval()) if has_interval else ConfidenceInterval()
+    interval = entry.intervals.get(name, ConfidenceInterval()) if has_interval else ConfidenceInterval()
     return layouts.Cell(
         text=format_rounded(entry.scores[name], decimals=entry.decimals, missing=layouts.ABSENT),
-        low=format_rounded(found.low, decimals=entry.decimals, missing=""),
-        high=format_rounded(found.high, decimals=entry.decimals, missing=""),
+        low=format_rounded(interval.low, decimals=entry.decimals, missing=""),
+        high=format_rounded(interval.high, decimals=entry.decimals, missing=""),
         is_best=name in entry.best,
         is_second=name in entry.second,
     )

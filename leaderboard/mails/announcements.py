@@ -43,15 +43,15 @@ def written(*, split: Split, subject: str, text: str) -> Announcement:
 
 
 def left(announcement: Announcement) -> list[User]:
-    """Who would get it now: whoever wants announcements, has a team that sent a file, and has not got it."""
+    """Users who would get it now: they want announcements, their team sent a file, they have not got it."""
     people = notices.readers(MailKind.ANNOUNCEMENT).filter(notices.has_sent_to(announcement.split))
     keys = {user: announcement.key(user.pk) for user in people}
-    told = set(Mail.objects.filter(key__in=keys.values()).values_list("key", flat=True))
-    return [user for user, key in keys.items() if key not in told]
+    sent_keys = set(Mail.objects.filter(key__in=keys.values()).values_list("key", flat=True))
+    return [user for user, key in keys.items() if key not in sent_keys]
 
 
 def announce(announcement: Announcement, *, now: datetime, actor: User | None) -> int:
-    """Queue it for everybody who has not got it; returns for how many. Raises `NotMaintainer`."""
+    """Queue it for all who have not got it; returns for how many. Raises `NotMaintainer`."""
     require_maintainer(actor, to="mail the teams of a split")
     with transaction.atomic():
         split = Split.objects.select_for_update(no_key=True).filter(pk=announcement.split.pk).first()

@@ -19,23 +19,23 @@ class FaultReportHandler(logging.Handler):
     """Puts a line of the log, without secrets, into the outbox. A fault there never raises another."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Queue one mail for each person, unless the same fault was told within the hour."""
+        """Queue one mail for each person, unless the same fault was reported within the hour."""
         try:
-            self._queue(self.format(record), place=f"{record.name}:{record.lineno}", now=timezone.now())
+            self._queue(self.format(record), origin=f"{record.name}:{record.lineno}", now=timezone.now())
         except Exception:  # noqa: BLE001 - logging's own rule: whatever fails, the caller goes on
             self.handleError(record)
 
-    def _queue(self, line: str, *, place: str, now: datetime) -> None:
+    def _queue(self, line: str, *, origin: str, now: datetime) -> None:
         from leaderboard.models import Mail, MailKind  # noqa: PLC0415 - logging is set up before the models
 
         for address in settings.ERROR_EMAILS:
-            told = hashlib.sha256(f"{place}{now:{_HOUR}}{address}".encode()).hexdigest()
+            digest = hashlib.sha256(f"{origin}{now:{_HOUR}}{address}".encode()).hexdigest()
             mail = Mail(
                 kind=MailKind.ACCOUNT,
                 recipient=address,
                 subject=f"[{settings.SITE_NAME}] An error on the site",
                 text=line[:_MAX_CHARACTERS],
-                key=f"error:{told[:60]}",
+                key=f"error:{digest[:60]}",
                 queued_at=now,
                 due_at=now,
             )

@@ -1,4 +1,4 @@
-"""Notices: what people are told by mail, once, unless they have switched it off.
+"""Notices: mails about events, each sent once, unless the person has switched them off.
 
 Workers find them in the tables. A notice goes to members of the team that owns what it is about, and names
 nothing of any other team.
@@ -55,7 +55,7 @@ def queue_due(*, now: datetime) -> None:
 
 
 def readers(kind: MailKind) -> QuerySet[User]:
-    """Who gets mails of a kind: active accounts with a proved address that have not switched it off."""
+    """Users who get mails of a kind: active, with a proved address, and have not switched it off."""
     people = User.objects.filter(is_active=True)
     if settings.ACCOUNT_EMAIL_VERIFICATION == "mandatory":
         proved = EmailAddress.objects.filter(

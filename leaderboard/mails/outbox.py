@@ -20,7 +20,7 @@ log = structlog.get_logger(__name__)
 # What a mail server that is away, or does not want a mail, raises.
 FAULTS: Final = (OSError, smtplib.SMTPException)
 MAX_AT_ONCE: Final = 50
-PATIENCE: Final = timedelta(days=3)
+GIVE_UP_AFTER: Final = timedelta(days=3)
 _FIRST_WAIT: Final = timedelta(seconds=30)
 _LONGEST_WAIT: Final = timedelta(hours=1)
 # Kept so long to know what was told already.
@@ -57,7 +57,7 @@ def tell(*, kind: MailKind, user: User, key: str, subject: str, text: str, now: 
 
 
 def queue(mails: list[Mail]) -> None:
-    """Queue notices; what was told already, by its key, is not told again."""
+    """Queue notices; one whose key is known already is left out."""
     Mail.objects.bulk_create(mails, ignore_conflicts=True)
 
 
@@ -78,7 +78,7 @@ def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) 
             continue  # somebody else sends it
         is_sent = _sent(EmailMessage(mail.subject, mail.text, to=[mail.recipient]))
         n_sent += is_sent
-        if is_sent or mail.queued_at <= now - PATIENCE:
+        if is_sent or mail.queued_at <= now - GIVE_UP_AFTER:
             _end(mail, now=now, is_sent=is_sent)
         if not is_sent:
             break
@@ -86,12 +86,12 @@ def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) 
 
 
 def purge(*, now: datetime) -> int:
-    """Forget what was told long ago. Returns how many."""
+    """Delete mails that were sent long ago. Returns how many."""
     return Mail.objects.filter(ended_at__lt=now - KEPT).delete()[0]
 
 
 def _end(mail: Mail, *, now: datetime, is_sent: bool) -> None:
-    """Nothing of a mail stays: links in it open accounts, and addresses are nobody's business."""
+    """Clear the mail's text and recipient: links in it open accounts, and addresses are private."""
     ended = {"recipient": "", "subject": "", "text": "", "ended_at": now, "is_sent": is_sent}
     Mail.objects.filter(pk=mail.pk).update(**ended)
     if not is_sent:

@@ -27,8 +27,8 @@ Details = Mapping[str, Any]
 """A method's details by name: each of the registry, an empty text or None where it is not specified."""
 
 
-def bad_value(name: str, found: object, expected: str, *, advice: str = "") -> Refused:
-    message = f"The field '{name}' is {str(found)[:60]!r}; expected {expected}."
+def bad_value(name: str, given: object, expected: str, *, advice: str = "") -> Refused:
+    message = f"The field '{name}' is {str(given)[:60]!r}; expected {expected}."
     return Refused("bad-value", message, field=name, advice=advice)
 
 
@@ -351,7 +351,7 @@ DETAILS: tuple[Detail, ...] = (
 
 
 def stated(**values: Any) -> Details:
-    """The details of whoever states these and no others.
+    """The details with these values and no others.
 
     >>> {name: value for name, value in stated(n_frames=6).items() if value}
     {'n_frames': 6}

@@ -138,8 +138,9 @@ class Migration(migrations.Migration):
             name='EditionRanges',
             fields=[
                 ('edition', models.OneToOneField(on_delete=django.db.models.deletion.CASCADE, primary_key=True, related_name='rank_ranges', serialize=False, to='leaderboard.edition')),
-                ('digest', models.CharField(help_text='Names the entries that they are made of.', max_length=80)),
-                ('ranges', models.JSONField(help_text='By evaluation, of every column of the protocol: best and worst rank, or null.')),
+                ('digest', models.CharField(blank=True, help_text='Names the entries that they are made of.', max_length=80)),
+                ('ranges', models.JSONField(default=dict, help_text='By evaluation, of every column of the protocol: best and worst rank, or null.')),
+                ('claimed_until', models.DateTimeField(blank=True, help_text='Until then one worker computes them, and no other begins.', null=True)),
             ],
         ),
         migrations.AddField(

@@ -58,12 +58,12 @@ class Unsealed:
 
 
 class AuditEventQuerySet(models.QuerySet["AuditEvent"]):
-    """Reads and appends. On PostgreSQL a trigger refuses the rest as well, whoever asks for it."""
+    """Reads and appends only. On PostgreSQL a trigger refuses changes by others too."""
 
     def unsealed(self) -> Unsealed:
         """What the next sweep is to seal, by the database's clock."""
-        found = self.filter(hash=None).aggregate(n=Count("pk"), age=Now() - Min("at"))
-        return Unsealed(found["n"], max(0.0, found["age"].total_seconds()) if found["age"] else 0.0)
+        totals = self.filter(hash=None).aggregate(n=Count("pk"), age=Now() - Min("at"))
+        return Unsealed(totals["n"], max(0.0, totals["age"].total_seconds()) if totals["age"] else 0.0)
 
     def update(self, **kwargs: Any) -> NoReturn:
         """Refused."""

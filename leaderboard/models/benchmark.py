@@ -37,7 +37,7 @@ class SplitQuerySet(models.QuerySet["Split"]):
         return self.exclude(listing=Listing.OFF)
 
     def lock_shared(self, name: str) -> "Split":
-        """The split as it is, and stays until the transaction ends; others may hold it like this as well.
+        """Lock the split against changes until the transaction ends; other readers may lock it as well.
 
         A submission holds it so, and whoever opens, publishes or rolls back an edition holds it alone: no
         submission can slip between an edition's opening and its list of what to score.
@@ -126,7 +126,7 @@ class Split(QuotaRules):
         return self.name
 
     def clean(self) -> None:
-        """Raise `ValidationError` for rules that make no sense, alone or beside the split it shares with."""
+        """Raise `ValidationError` for rules that make no sense, alone or with the split it shares with."""
         super().clean()
         if self.announcement and self.announcement_ends_at is None:
             raise ValidationError({"announcement_ends_at": NO_END})
@@ -143,13 +143,13 @@ class Split(QuotaRules):
 
     def faults(self) -> dict[str, str]:
         """The same, and of its times."""
-        found = super().faults()
+        faults = super().faults()
         if self.opens_at and self.closes_at and self.opens_at >= self.closes_at:
-            found["closes_at"] = (
+            faults["closes_at"] = (
                 f"The split would close at {self.closes_at:%Y-%m-%d %H:%M} UTC and open at "
                 f"{self.opens_at:%Y-%m-%d %H:%M} UTC; expected to open before it closes."
             )
-        return found
+        return faults
 
     def announcement_at(self, now: datetime) -> str:
         """The line that its pages show at this moment; empty if there is none, or if it has ended."""
@@ -282,7 +282,7 @@ class Edition(UnitOfInference):
 
     @property
     def is_in_preparation(self) -> bool:
-        """Whether it stands beside the board, neither published nor given up."""
+        """Whether it is neither published nor given up."""
         return self.published_at is None and self.discarded_at is None
 
     def ended_at(self, split: Split) -> datetime | None:
@@ -339,7 +339,7 @@ class PublishedResultQuerySet(models.QuerySet["PublishedResult"]):
 
 
 class PublishedResult(models.Model):
-    """A row quoted from a paper: ranked beside the submissions, marked, never re-scored.
+    """A row quoted from a paper: ranked with the submissions, marked, never re-scored.
 
     A row that is corrected is not changed but replaced by another one, so that boards of the past stay.
     """

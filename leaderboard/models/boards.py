@@ -6,7 +6,7 @@ from leaderboard.models.benchmark import Split
 
 
 class BoardVersion(models.Model):
-    """Counts what happened to a split's boards. A row of its own, so that nobody who submits waits for it."""
+    """Counts changes of a split's boards. A separate row, so that submitting does not wait for its lock."""
 
     split = models.OneToOneField(
         Split, primary_key=True, on_delete=models.CASCADE, related_name="board_version"

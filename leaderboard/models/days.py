@@ -1,4 +1,4 @@
-"""Days in UTC: as exactly as everybody is told when something happened to an anonymous method.
+"""Days in UTC: the precision at which everybody sees the times of an anonymous method.
 
 A second would tell whose it is: of a team that sends an anonymous method and a named one in one go, say.
 """
@@ -7,7 +7,7 @@ from datetime import UTC, datetime, time
 
 
 def truncate_to_day(at: datetime, *, is_masked: bool) -> datetime:
-    """The time as everybody is told it: of an anonymous method the beginning of its day.
+    """The time as everybody sees it: of an anonymous method the beginning of its day.
 
     >>> truncate_to_day(datetime(2026, 11, 21, 15, 4, 5, tzinfo=UTC), is_masked=True).isoformat()
     '2026-11-21T00:00:00+00:00'
@@ -21,9 +21,9 @@ def truncate_to_day_or_none(at: datetime | None, *, is_masked: bool) -> datetime
 
 
 def known_until(at: datetime, *, is_masked: bool) -> datetime:
-    """Until when a board as of `at` knows what happened to a method: to an anonymous one on the whole day.
+    """Time up to which a board as of `at` knows events of a method; for an anonymous one the end of that day.
 
-    So nobody narrows down its time by asking for board after board.
+    So its time cannot be narrowed down by a series of boards.
 
     >>> known_until(datetime(2026, 11, 21, 15, 4, 5, tzinfo=UTC), is_masked=True).isoformat()
     '2026-11-21T23:59:59.999999+00:00'

@@ -13,9 +13,13 @@ class EditionRanges(models.Model):
     edition = models.OneToOneField(
         Edition, on_delete=models.CASCADE, primary_key=True, related_name="rank_ranges"
     )
-    digest = models.CharField(max_length=80, help_text="Names the entries that they are made of.")
+    digest = models.CharField(max_length=80, blank=True, help_text="Names the entries that they are made of.")
     ranges = models.JSONField(
-        help_text="By evaluation, of every column of the protocol: best and worst rank, or null."
+        default=dict,
+        help_text="By evaluation, of every column of the protocol: best and worst rank, or null.",
+    )
+    claimed_until = models.DateTimeField(
+        null=True, blank=True, help_text="Until then one worker computes them, and no other begins."
     )
 
     def __str__(self) -> str:

@@ -139,7 +139,7 @@ class Method(models.Model):
 
     @property
     def pseudonym(self) -> str:
-        """What an anonymous one is called: the same for ever, and of its random id alone."""
+        """The name of an anonymous method: constant, and from its random id alone."""
         return f"Anonymous {self.id.hex[:6]}"
 
     def was_shown(self, *, at: datetime | None = None) -> bool:

@@ -184,5 +184,5 @@ class ApiToken(AbstractAuthToken):
     @property
     def scopes(self) -> tuple[str, ...]:
         """What it may be used for, as words."""
-        held = {Scope.READ: self.may_read, Scope.SUBMIT: self.may_submit}
-        return tuple(scope.value for scope, is_held in held.items() if is_held)
+        granted = {Scope.READ: self.may_read, Scope.SUBMIT: self.may_submit}
+        return tuple(scope.value for scope, is_granted in granted.items() if is_granted)

@@ -75,22 +75,22 @@ class QuotaRules(models.Model):
 
     def faults(self) -> dict[str, str]:
         """By field, what is found and what is expected of each rule that makes no sense."""
-        found = {}
+        faults = {}
         for name in ("quota_limit", "quota_rejected_limit"):
             count = getattr(self, name)
             if count is not None and count < 0:
-                found[name] = f"The number is {count}; expected one from 0, or nothing."
+                faults[name] = f"The number is {count}; expected one from 0, or nothing."
         if self.quota_window is not None and not _is_span(self.quota_window, is_none_allowed=False):
-            found["quota_window"] = (
+            faults["quota_window"] = (
                 f"The window is {self.quota_window}; expected whole seconds, more than 0 and at most "
                 f"{MAX_SPAN.days:,} days."
             )
         if self.quota_min_gap is not None and not _is_span(self.quota_min_gap, is_none_allowed=True):
-            found["quota_min_gap"] = (
+            faults["quota_min_gap"] = (
                 f"The least time apart is {self.quota_min_gap}; expected whole seconds, from 0 to "
                 f"{MAX_SPAN.days:,} days."
             )
-        return found
+        return faults
 
 
 def _is_span(span: timedelta, *, is_none_allowed: bool) -> bool:

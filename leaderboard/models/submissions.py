@@ -43,7 +43,7 @@ class SubmissionQuerySet(models.QuerySet["Submission"]):
         """The person's own team's submissions, without those to splits that are switched off."""
         return self.filter(method__team__memberships__user=user, split__in=Split.objects.shown())
 
-    def standing(self) -> Self:
+    def active(self) -> Self:
         """Submissions that their team has not withdrawn."""
         return self.filter(withdrawn_at=None)
 
@@ -138,17 +138,17 @@ class EvaluationQuerySet(models.QuerySet["Evaluation"]):
         return self.order_by("n_poison_strikes", "priority", Exists(of_the_same), "queued_at")
 
     def suspect(self) -> Self:
-        """What came to nothing although no machine failed: those whose file may be the cause."""
+        """Evaluations that failed without a failure of machines: their file may be the cause."""
         return self.filter(
             status=Status.SYSTEM_ERROR,
             n_poison_strikes__gt=0,
             n_infrastructure_strikes__lt=MAX_INFRASTRUCTURE_STRIKES,
         )
 
-    def scorable(self, held: Collection[str]) -> Self:
-        """What is scored against a ground truth of one of these digests."""
-        # Asked beside and not joined, so that no edition is locked with it.
-        return self.filter(edition__in=Edition.objects.filter(ground_truth__in=held))
+    def scorable(self, readable_truths: Collection[str]) -> Self:
+        """Evaluations against a ground truth whose digest is among these."""
+        # A subquery and no join, so that no edition is locked with it.
+        return self.filter(edition__in=Edition.objects.filter(ground_truth__in=readable_truths))
 
 
 class Evaluation(models.Model):

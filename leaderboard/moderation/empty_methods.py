@@ -1,4 +1,4 @@
-"""Deletion of a method of which nothing was ever scored. Its submissions are withdrawn; its name is free."""
+"""Deletion of a method without any score. Its submissions are withdrawn; its name is free."""
 
 from datetime import datetime
 
@@ -13,7 +13,7 @@ from leaderboard.submissions import intake
 
 
 def can_be_deleted(method: Method) -> bool:
-    """Whether nobody else has seen the method, and nothing of it was or can be scored."""
+    """Whether only its team has seen the method, and nothing of it was or can be scored."""
     if method.visibility != Visibility.PRIVATE or method.deleted_at is not None:
         return False
     others = Evaluation.objects.exclude(status__in=[Status.REJECTED, Status.CANCELLED])
@@ -33,7 +33,7 @@ def delete(*, method: Method, actor: User, now: datetime) -> None:
                 f"The method {row.name!r} cannot be deleted; expected a private method without a scored or "
                 "waiting submission.",
             )
-        for sent in Submission.objects.standing().filter(method=row).select_related("method__team"):
+        for sent in Submission.objects.active().filter(method=row).select_related("method__team"):
             intake.withdraw(submission=sent, actor=actor, now=now)
         row.deleted_at = now
         row.save(update_fields=["deleted_at"])

@@ -159,13 +159,13 @@ def masked(noun: str, pk: UUID) -> str:
 
 def _locked_teams(*wanted: Team) -> list[Team]:
     """These teams, locked. Raises `Refused` where one has ended."""
-    found = teams.locked(*wanted)
-    if len(found) < len({team.pk for team in wanted}):
+    locked = teams.locked(*wanted)
+    if len(locked) < len({team.pk for team in wanted}):
         raise Refused(
             "changed-meanwhile",
             "The team was deleted a moment ago; reload the page and choose another team.",
         )
-    return found
+    return locked
 
 
 def _locked(method: Method) -> Method:

@@ -24,18 +24,18 @@ REST_S = 5.0
 
 
 class CircuitBreaker:
-    """After a failure the broker is left alone for a while, or everybody would wait for it in turn."""
+    """Skip the broker for `rest_s` after a failure, so that not every request waits for it."""
 
     def __init__(self, *, rest_s: float) -> None:
         self._rest_s = rest_s
         self._until_s = 0.0
 
     def begin(self) -> None:
-        """It has just failed."""
+        """Note that it has just failed."""
         self._until_s = time.monotonic() + self._rest_s
 
     def __bool__(self) -> bool:
-        """Whether it is to be left alone now."""
+        """Whether the broker is to be skipped now."""
         return time.monotonic() < self._until_s
 
 

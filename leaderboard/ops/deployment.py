@@ -21,37 +21,37 @@ _BROKERS: Final = ("redis://", "rediss://", "redis+socket://", "amqp://", "amqps
 
 def check_variables(app_configs: object = None, **kwargs: Any) -> list[CheckMessage]:
     """What is wrong with the variables, as far as they can be read."""
-    found: list[CheckMessage] = [
+    messages: list[CheckMessage] = [
         Caution(sentence, id="leaderboard.W002") for sentence in environment.misspelt(os.environ)
     ]
     if not environment.PRODUCTION:
-        return found
-    found += [Error(sentence, id="leaderboard.E002") for sentence in _addresses()]
+        return messages
+    messages += [Error(sentence, id="leaderboard.E002") for sentence in _addresses()]
     if environment.PROCESS == "web" and not settings.SENDS_MAIL:
         message = (
             "TSTTC_EMAIL_URL is not set: mails are printed to the log, and nobody has to prove an address."
         )
-        found.append(Caution(message, id="leaderboard.W003"))
-    return found
+        messages.append(Caution(message, id="leaderboard.W003"))
+    return messages
 
 
 def check_services(app_configs: object = None, **kwargs: Any) -> list[CheckMessage]:
     """The services that a production needs and that do not answer; each is given some seconds."""
     if not environment.PRODUCTION:
         return []
-    found = []
+    faults = []
     if not health.database().is_ok:
-        found.append("The database of TSTTC_DATABASE_URL does not answer, or does not know the account.")
+        faults.append("The database of TSTTC_DATABASE_URL does not answer, or does not know the account.")
     if environment.PROCESS in {"web", "worker", "maintainer"}:
         if settings.CELERY_BROKER_URL.startswith(_BROKERS) and not health.broker().is_ok:
-            found.append("The broker of TSTTC_BROKER_URL does not answer.")
+            faults.append("The broker of TSTTC_BROKER_URL does not answer.")
         try:
             storages["files"].exists("manifests/none.csv")
         except Exception as fault:  # noqa: BLE001 - whatever the store of somebody else raises
-            found.append(f"The file store does not answer: {type(fault).__name__}.")
+            faults.append(f"The file store does not answer: {type(fault).__name__}.")
         if not settings.FILES_URL and not _can_be_written(str(settings.FILES_DIR)):
-            found.append(f"TSTTC_FILES_DIR is {settings.FILES_DIR}, which this account cannot write to.")
-    return [Error(sentence, id="leaderboard.E003") for sentence in found]
+            faults.append(f"TSTTC_FILES_DIR is {settings.FILES_DIR}, which this account cannot write to.")
+    return [Error(sentence, id="leaderboard.E003") for sentence in faults]
 
 
 def _addresses() -> Iterator[str]:

@@ -38,7 +38,7 @@ _PREFIX: Final = "TSTTC_"
 
 
 class Environment(environ.Env):
-    """The variables. An empty one is as good as none; a malformed one goes to `FAULTS`, as its default."""
+    """The variables. An empty one counts as absent; a malformed one is in `FAULTS` and has its default."""
 
     def get_value(self, var: str, cast: Any = None, default: Any = environ.Env.NOTSET, **options: Any) -> Any:
         """The value of a variable, or the default."""
@@ -66,18 +66,18 @@ def mail_server(text: str) -> dict[str, Any]:
 
 def networks(name: str, *, default: list[str]) -> list[IPv4Network | IPv6Network]:
     """The networks that a variable lists."""
-    found = []
+    parsed = []
     for text in env.list(name, default=default):
         try:
-            found.append(ip_network(text.strip()))
+            parsed.append(ip_network(text.strip()))
         except ValueError:
             FAULTS.append(f"{name} has {text!r}; expected networks such as 10.0.0.0/8, separated by commas.")
-    return found
+    return parsed
 
 
 def providers(**known: tuple[str, str, str]) -> dict[str, dict[str, Any]]:
     """allauth's settings of the providers whose client is set; each has a name and two variables."""
-    found = {}
+    configured = {}
     for provider, (name, id_variable, secret_variable) in known.items():
         client_id, secret = (env.str(variable, default="") for variable in (id_variable, secret_variable))
         if bool(client_id) != bool(secret):
@@ -85,28 +85,28 @@ def providers(**known: tuple[str, str, str]) -> dict[str, dict[str, Any]]:
             given = id_variable if client_id else secret_variable
             FAULTS.append(f"{missing} is not set, and {given} is; expected both or none.")
         if client_id and secret:
-            found[provider] = {
+            configured[provider] = {
                 "APP": {"name": name, "client_id": client_id, "secret": secret},
                 # A code that somebody intercepts is worth nothing without what this site kept (RFC 7636).
                 "OAUTH_PKCE_ENABLED": True,
             }
-    return found
+    return configured
 
 
 def _parsed(name: str, text: str, parse: Callable[[str], dict[str, Any]], example: str) -> dict[str, Any]:
     try:
-        found = parse(text) if text else {}
+        parsed = parse(text) if text else {}
     except (ValueError, KeyError, LookupError, ImproperlyConfigured):
-        found = {}
-    is_nowhere = "smtp" in found.get("EMAIL_BACKEND", "") and not found["EMAIL_HOST"]
-    if text and (is_nowhere or not found.get("ENGINE", found.get("EMAIL_BACKEND"))):
+        parsed = {}
+    is_nowhere = "smtp" in parsed.get("EMAIL_BACKEND", "") and not parsed["EMAIL_HOST"]
+    if text and (is_nowhere or not parsed.get("ENGINE", parsed.get("EMAIL_BACKEND"))):
         # Without the text: it may have a password.
         FAULTS.append(f"{name} is not understood; expected an address such as {example}.")
-    return found
+    return parsed
 
 
 def misspelt(names: Iterable[str]) -> list[str]:
-    """A sentence for each `TSTTC_…` among these that nobody reads, with the name that may be meant."""
+    """A sentence for each `TSTTC_…` among these that is never read, with the name that may be meant."""
     known = ASKED | {_PREFIX + name for name in _OF_OTHERS}
     sentences = []
     for name in sorted(names):
@@ -119,7 +119,7 @@ def misspelt(names: Iterable[str]) -> list[str]:
 def require_sound() -> None:
     """Say everything that is wrong with the variables. Raises `ImproperlyConfigured`.
 
-    Names that nobody reads are no fault, but why a variable is not set may be that it is misspelt.
+    Names that are never read are no fault, but may explain why a variable is not set.
     """
     if FAULTS:
         # Django may read the settings twice; each fault is said once.
@@ -141,9 +141,9 @@ if PROCESS not in PROCESSES:
 
 
 def required(name: str, *, embedded: Any, by: Collection[str] = PROCESSES, elsewhere: Any = "") -> Any:
-    """The variable's text; in production its absence is an error, elsewhere `embedded` stands in.
+    """The variable's text; in production its absence is an error, elsewhere the default is `embedded`.
 
-    `by` are the processes of production that need it; in the others `elsewhere` stands in.
+    `by` are the processes of production that need it; in the others the default is `elsewhere`.
     """
     if not PRODUCTION:
         return env.str(name, default=embedded)
@@ -153,14 +153,14 @@ def required(name: str, *, embedded: Any, by: Collection[str] = PROCESSES, elsew
 
 
 def make_private(folder: Path) -> None:
-    """Make a folder that its owner alone can read; one that exists is closed to everybody else.
+    """Make a folder that its owner alone can read; close an existing one to all others.
 
     A folder of somebody else, or one that many share (such as /tmp), stays as it is.
     """
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    found = folder.stat()
-    is_shared = found.st_uid != os.geteuid() or found.st_mode & stat.S_ISVTX
-    if not is_shared and stat.S_IMODE(found.st_mode) & 0o077:
+    status = folder.stat()
+    is_shared = status.st_uid != os.geteuid() or status.st_mode & stat.S_ISVTX
+    if not is_shared and stat.S_IMODE(status.st_mode) & 0o077:
         folder.chmod(0o700)
 
 

@@ -110,7 +110,7 @@ def _database() -> tuple[Check, ...]:
 
 
 def _ground_truth(n_without: int) -> Check:
-    """Whether the workers can read what they score against; how much waits is nobody's business."""
+    """Whether the workers can read the ground truth of what waits. It does not say how much waits."""
     detail = (
         "a worker cannot read the ground truth of an evaluation that waits"
         if n_without

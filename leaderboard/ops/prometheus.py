@@ -188,7 +188,7 @@ _METHODS: Final = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "O
 
 
 def count(*, method: str, route: str, status: int, took_s: float) -> None:
-    """Count one answer. `route` is a name out of few, never an address that somebody typed."""
+    """Count one answer. `route` is one of a few names, never an address from a request."""
     method = method if method in _METHODS else "other"
     _REQUESTS.labels(method, route, f"{status // 100}xx").inc()
     _SECONDS.labels(route).observe(took_s)

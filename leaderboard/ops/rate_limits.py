@@ -25,15 +25,15 @@ IN_PROCESS: Final = LocMemCache("rate_limits", {"OPTIONS": {"MAX_ENTRIES": 10_00
 
 
 def address_of(request: Any) -> str:
-    """Where a request comes from. Who has an IPv6 address has 2⁶⁴ of them: they count as one.
+    """The address of a request. IPv6 addresses count as one if their first 64 bits are equal.
 
-    It is that of the connection, or with `TSTTC_TRUSTED_PROXIES` the one that our own proxy wrote down.
+    It is that of the connection, or with `TSTTC_TRUSTED_PROXIES` the one in our own proxy's header.
     """
     try:
-        found = ip_address(BaseThrottle().get_ident(request))
+        address = ip_address(BaseThrottle().get_ident(request))
     except ValueError:
         return "unknown"
-    return str(ip_network((found, 64), strict=False) if isinstance(found, IPv6Address) else found)
+    return str(ip_network((address, 64), strict=False) if isinstance(address, IPv6Address) else address)
 
 
 def account_or_address(request: Any) -> str:
@@ -42,7 +42,7 @@ def account_or_address(request: Any) -> str:
 
 
 def refusal(wait_s: float) -> str:
-    """What is said to who asked too often, on pages and in the API."""
+    """The sentence for a client that asked too often, on pages and in the API."""
     return f"Too many requests in a short time; the next one is answered in {math.ceil(wait_s)} s."
 
 
@@ -70,7 +70,7 @@ class Throttle(SimpleRateThrottle):
         return address_of(request)
 
     def get_cache_key(self, request: Any, view: "APIView | None") -> str | None:
-        """A hash: addresses and accounts are nobody's business in a cache."""
+        """A hash, so that no address or account is in the cache."""
         who = self.identity(request)
         text = f"{self.rates}:{self.scope}:{who}"
         return None if who is None else f"rate:{hashlib.sha256(text.encode()).hexdigest()}"

@@ -1,4 +1,4 @@
-"""Email addresses where the site proves them: one that nobody has proved takes nothing from its owner.
+"""Email addresses where the site proves them: an unproved one takes nothing from its owner.
 
 An account that was never confirmed gives way to the next sign-up, and is deleted after a day.
 """
@@ -25,7 +25,7 @@ def accounts_of(address: str) -> QuerySet[User]:
 
 
 def release(*, address: str, to: User | None = None) -> None:
-    """Take the address from everybody who has not proved it, but not from the person who does so now."""
+    """Delete unconfirmed accounts with this address, except that of `to`."""
     if not are_proved():
         return
     others = User.objects.filter(email__iexact=address)
@@ -33,7 +33,7 @@ def release(*, address: str, to: User | None = None) -> None:
 
 
 def delete_unproved(*, now: datetime) -> None:
-    """Delete accounts that nobody confirmed within a day."""
+    """Delete accounts that were not confirmed within `UNCONFIRMED_FOR`."""
     if are_proved():
         _delete_unconfirmed(User.objects.filter(date_joined__lt=now - UNCONFIRMED_FOR))
 
@@ -46,7 +46,7 @@ def _delete_unconfirmed(people: QuerySet[User]) -> None:
 
 
 def are_proved() -> bool:
-    """Whether addresses are proved here. Where they are not, an address says nothing of who has it."""
+    """Whether users must prove their addresses here."""
     return bool(settings.ACCOUNT_EMAIL_VERIFICATION == "mandatory")
 
 

@@ -19,12 +19,12 @@ from leaderboard.people import accounts, teams
 from leaderboard.people.names import confusable_with, numbered
 
 LIFETIME = timedelta(days=7)
-MAX_STANDING = 20
+MAX_OPEN = 20
 _SECRET = re.compile(r"[A-Za-z0-9_-]{43}")
 
 
 class UnusableInvitation(Refused):
-    """The link let somebody in once, or would have, and does not any more."""
+    """The invitation was used, was revoked or has expired."""
 
 
 @dataclass(frozen=True)
@@ -41,16 +41,16 @@ class Meaning:
 
 
 def make(*, team: Team, actor: User, now: datetime) -> tuple[Invitation, str]:
-    """A new invitation into one's team, and its secret, which is told this once. Raises `Refused`."""
+    """Make an invitation into one's team. Returns it and its secret, which is not kept. Raises `Refused`."""
     secret = secrets.token_urlsafe(32)
     with transaction.atomic():
         row = teams.locked_team(team)
         teams.require_owner(row, actor, doing="invites")
-        n_standing = open_invitations(team=row, now=now).count()
-        if n_standing >= MAX_STANDING:
+        n_open = open_invitations(team=row, now=now).count()
+        if n_open >= MAX_OPEN:
             raise Refused(
                 "too-many-invitations",
-                f"The team has {n_standing} unused invitations, the maximum; revoke one.",
+                f"The team has {n_open} unused invitations, the maximum; revoke one.",
             )
         invitation = Invitation.objects.create(
             team=row,
@@ -69,7 +69,7 @@ def link(secret: str) -> str:
 
 
 def open_invitations(*, team: Team, now: datetime) -> "QuerySet[Invitation]":
-    """The team's invitations that somebody may still use."""
+    """The team's invitations that can still be used."""
     return Invitation.objects.filter(team=team, accepted_at=None, revoked_at=None, expires_at__gt=now)
 
 
@@ -83,7 +83,7 @@ def state_of(invitation: Invitation, *, now: datetime) -> str:
 
 
 def revoke(*, invitation: Invitation, actor: User, now: datetime) -> bool:
-    """End an invitation that nobody has used. Returns False if it had ended. Raises `Refused`."""
+    """Revoke an unused invitation. Returns False if it had ended. Raises `Refused`."""
     with transaction.atomic():
         row = teams.locked_team(invitation.team)
         teams.require_owner(row, actor, doing="revokes invitations")
@@ -100,10 +100,10 @@ def find(*, secret: str, now: datetime) -> Invitation | None:
     """The invitation of this link; None if there is none. Raises `UnusableInvitation` if it has ended."""
     if not _SECRET.fullmatch(secret):
         return None
-    found = Invitation.objects.select_related("team", "created_by").filter(secret_hash=_hash(secret)).first()
-    if found is not None:
-        _require_open(found, now=now)
-    return found
+    row = Invitation.objects.select_related("team", "created_by").filter(secret_hash=_hash(secret)).first()
+    if row is not None:
+        _require_open(row, now=now)
+    return row
 
 
 def meaning(*, invitation: Invitation, user: User) -> Meaning:
@@ -130,7 +130,7 @@ def meaning(*, invitation: Invitation, user: User) -> Meaning:
 
 
 def accept(*, secret: str, user: User, now: datetime) -> Team:
-    """Join the team by a link, once. Whoever was alone in a team brings its methods. Raises `Refused`."""
+    """Join the team by a link, once. A user who was alone in a team brings its methods. Raises `Refused`."""
     seen = find(secret=secret, now=now)
     if seen is None:
         raise _nothing()
@@ -235,9 +235,9 @@ def _bring_methods(former: Team, team: Team) -> dict[str, str]:
 
 
 def _names_there(names: Iterable[str], taken: Iterable[str]) -> dict[str, str]:
-    found: dict[str, str] = {}
+    numbered_names: dict[str, str] = {}
     others = list(taken)
     for name in names:
-        found[name] = numbered(name, is_taken=lambda new: confusable_with(new, others))
-        others.append(found[name])
-    return found
+        numbered_names[name] = numbered(name, is_taken=lambda new: confusable_with(new, others))
+        others.append(numbered_names[name])
+    return numbered_names

@@ -41,7 +41,7 @@ def skeleton(name: str) -> str:
 
 
 def clean_name(field: str, text: str) -> str:
-    """A name as it is kept and shown. Raises `Refused` for what is none, or hides what it says."""
+    """A name as it is saved and shown. Raises `Refused` for an empty one or characters without ink."""
     text = clean_text(field, _with_plain_spaces(text), limit=MAX_NAME)
     n_marks = 0
     for character in text:
@@ -115,9 +115,9 @@ def _folded(character: str) -> str:
         return "-"
     # Where only the other case has a twin in ASCII, both have its look: a name in Cyrillic is one name.
     for form in (character, character.swapcase(), character.casefold()):
-        found = _prototypes().get(form, form)
-        if found.isascii():
-            return found
+        look = _prototypes().get(form, form)
+        if look.isascii():
+            return look
     small_capital = unicodedata.name(character, "").partition("LATIN LETTER SMALL CAPITAL ")[2]
     if len(small_capital) == 1:
         return small_capital
@@ -133,15 +133,15 @@ def _prototypes() -> Mapping[str, str]:
 
     data: Mapping[str, list[dict[str, Any]]] = confusables_data
     # The library lists pairs both ways round: what has many partners is the target.
-    found = {}
+    prototypes = {}
     for character, partners in data.items():
         if len(character) != 1 or character.isascii() or len(partners) != 1:
             continue
         target = partners[0]["c"]
         is_pair = len(data.get(target, [])) == 1 and len(target) == 1
         if not is_pair or target.isascii() or ord(target) < ord(character):
-            found[character] = _without_marks(target)
-    return found
+            prototypes[character] = _without_marks(target)
+    return prototypes
 
 
 def _without_marks(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Teams: who competes. A person is in one team at a time; somebody alone is a team of one.
+"""Teams: who competes. A person is in one team at a time; a person alone is a team of one.
 
 What changes who is in a team locks, in this order: the person, the teams by their ids, the invitation.
 """
@@ -22,7 +22,7 @@ def current_team_of(*, user: User) -> Team | None:
 
 
 def team_of(*, user: User) -> Team:
-    """The person's team; somebody without one becomes a team of one."""
+    """The person's team; a person without one becomes a team of one."""
     present = current_team_of(user=user)
     if present is not None:
         return present
@@ -78,7 +78,7 @@ def set_name(*, team: Team, name: str, now: datetime) -> None:
 
 
 def show_name(team: Team) -> None:
-    """Note that everybody reads the locked team's name from now on. Raises `Refused` where it is taken."""
+    """Mark the locked team's name as public. Raises `Refused` where it is taken."""
     if team.is_shown:
         return
     require_showable(team)
@@ -178,7 +178,7 @@ def require_owner(team: Team, actor: User, *, doing: str) -> None:
 
 
 def require_member(team: Team, user: User) -> None:
-    """Raise `Refused` for somebody who is not in the team, or not any more."""
+    """Raise `Refused` for a user who is not in the team, or not any more."""
     if not team.memberships.filter(user=user).exists():
         raise Refused("not-your-team", f"You are not in the team {team.name!r} any more; try again.")
 
@@ -202,10 +202,10 @@ def current_membership(user: User, *also: Team) -> Membership | None:
     accounts.hold(user)
     seen = Membership.objects.filter(user=user).select_related("team").first()
     locked(*also, seen.team if seen else None)
-    found = Membership.objects.filter(user=user).select_related("team").first()
-    if (found and found.team_id) != (seen and seen.team_id):
+    membership = Membership.objects.filter(user=user).select_related("team").first()
+    if (membership and membership.team_id) != (seen and seen.team_id):
         raise Refused("changed-meanwhile", "Your team has just changed; reload the page and try again.")
-    return found
+    return membership
 
 
 def end_if_empty(team: Team) -> bool:
@@ -227,12 +227,12 @@ def end_invitations(team: Team, *, of: User) -> None:
 
 
 def _membership_in(team: Team, user: User) -> Membership:
-    found = team.memberships.filter(user=user).first()
-    if found is None:
+    membership = team.memberships.filter(user=user).first()
+    if membership is None:
         raise Refused(
             "not-a-member", f"That person is not in the team {team.name!r}; expected one of its members."
         )
-    return found
+    return membership
 
 
 def _taken(name: str) -> Refused:
@@ -251,7 +251,7 @@ def _taken_first(name: str) -> Refused:
 
 
 def _public_twin(name: str, *, but: Team | None = None) -> bool:
-    """Whether a team that everybody sees has a name like it. Other teams take no name."""
+    """Whether a public team has a name like it. Other teams take no name."""
     shown = Team.objects.filter(look=skeleton(name), is_shown=True)
     return (shown.exclude(pk=but.pk) if but is not None else shown).exists()
 

@@ -19,7 +19,7 @@ from leaderboard.people import accounts
 
 DAYS = 90
 MAX_DAYS = 365
-MAX_STANDING = 50
+MAX_ACTIVE = 50
 ALL_SCOPES = (Scope.READ, Scope.SUBMIT)
 # What `create` makes; anything else is refused before the database is asked.
 PATTERN = re.compile(r"tsttc_[0-9a-f]{64}")
@@ -44,7 +44,7 @@ def create(
     days: int = DAYS,
     actor: User | None = None,
 ) -> str:
-    """A new token of that person, which is kept nowhere. Without `split_name` it is good for every split.
+    """Make a token of that person, which is not saved. Without `split_name` it is good for every split.
 
     Raises `Refused`.
     """
@@ -54,11 +54,9 @@ def create(
     with transaction.atomic():
         # Two at once would both find room for the last one.
         accounts.hold_open(user)
-        n_standing = ApiToken.objects.filter(user=user, revoked_at=None, expiry__gt=now).count()
-        if n_standing >= MAX_STANDING:
-            raise Refused(
-                "too-many-tokens", f"There are {n_standing} tokens in use, the maximum; revoke one."
-            )
+        n_active = ApiToken.objects.filter(user=user, revoked_at=None, expiry__gt=now).count()
+        if n_active >= MAX_ACTIVE:
+            raise Refused("too-many-tokens", f"There are {n_active} tokens in use, the maximum; revoke one.")
         digest, secret = get_digest_token()
         row = ApiToken(
             digest=digest,
@@ -85,8 +83,8 @@ def create(
 def _check(*, scopes: Collection[str], days: int) -> None:
     unknown = [scope for scope in scopes if scope not in Scope.values]
     if unknown or not scopes:
-        found = f"the scope {unknown[0][:40]!r}" if unknown else "no scope"
-        raise Refused("bad-scope", f"The token has {found}; expected read, submit, or both.", field="scopes")
+        given = f"the scope {unknown[0][:40]!r}" if unknown else "no scope"
+        raise Refused("bad-scope", f"The token has {given}; expected read, submit, or both.", field="scopes")
     if not 1 <= days <= MAX_DAYS:
         raise Refused(
             "bad-days",
@@ -169,7 +167,7 @@ def revoke_all(*, user: User, reason: str, actor: User | None, now: datetime) ->
 
 
 def revoke_leaked(*, secret: str, now: datetime) -> None:
-    """End the token of this secret, whoever found it. Whether there was one is told to nobody."""
+    """Revoke the token of this secret, if there is one; the caller does not learn whether there was."""
     if PATTERN.fullmatch(secret):
         row = ApiToken.objects.filter(pk=hash_token(secret)).first()
         if row is not None:

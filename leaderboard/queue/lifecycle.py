@@ -47,7 +47,7 @@ def batch_of(n_waiting: int) -> int:
 
 
 class LostRace(Exception):
-    """Somebody else decided this evaluation meanwhile; what was computed here is discarded."""
+    """Another worker decided this evaluation meanwhile; what was computed here is discarded."""
 
 
 class Strike(Enum):
@@ -68,7 +68,7 @@ class Lease:
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a run found, ready to be written.
+    """The outcome of a run, ready to be written.
 
     `scores` maps (metric, TTC range) to a published value; `problems` is the list shown to the submitter.
     """
@@ -144,17 +144,19 @@ def claim(
     wall_s: float,
     limit: int = 1,
     in_batches: bool = False,
-    held: Collection[str] | None = None,
+    readable_truths: Collection[str] | None = None,
 ) -> list[Lease]:
     """Take up to `limit` evaluations that are queued and due, the most urgent and oldest first.
 
-    With `held`, only those whose ground truth is among these digests: what this worker can score at all.
+    With `readable_truths`, only those whose ground truth is among these digests: what this worker can score.
     If the first is one of an edition's re-scoring, with `in_batches` some more of that edition's. Two workers
     never get the same one.
     """
     token = uuid.uuid4()
     with transaction.atomic():
-        due = Evaluation.objects.due() if held is None else Evaluation.objects.due().scorable(held)
+        due = Evaluation.objects.due()
+        if readable_truths is not None:
+            due = due.scorable(readable_truths)
         # What others have locked is left out. SQLite has one writer, and skips nothing.
         free = due.select_for_update(skip_locked=True, no_key=True)
         waiting = free.values_list("pk", "attempt", "priority", "edition")
@@ -177,7 +179,7 @@ def claim(
     return [Lease(evaluation_id=pk, attempt=attempt + 1, token=token) for pk, attempt, _, _ in rows]
 
 
-def _held(lease: Lease) -> QuerySet[Evaluation]:
+def _leased_row(lease: Lease) -> QuerySet[Evaluation]:
     """The row, if it is still this lease's to decide."""
     return Evaluation.objects.filter(
         pk=lease.evaluation_id, status=Status.RUNNING, attempt=lease.attempt, lease_token=lease.token
@@ -185,9 +187,9 @@ def _held(lease: Lease) -> QuerySet[Evaluation]:
 
 
 def heartbeat(lease: Lease, *, lease_s: float) -> bool:
-    """Renew the lease, never beyond the deadline. False: stop work, it is somebody else's now."""
+    """Renew the lease, never beyond the deadline. False: stop work, another worker has it."""
     renewed = (
-        _held(lease)
+        _leased_row(lease)
         .filter(deadline_at__gt=Now())
         .update(leased_until=Least(after(lease_s), F("deadline_at")))
     )
@@ -212,15 +214,15 @@ def finalise(lease: Lease, outcome: RunResult) -> bool:
 def finalise_many(outcomes: Sequence[tuple[Lease, RunResult]]) -> set[uuid.UUID]:
     """Write many outcomes in one transaction. Returns the evaluations that were written.
 
-    Those whose lease is no longer valid are left alone: somebody else decides them, or this worker had
+    Those whose lease is no longer valid are left alone: another worker decides them, or this one had
     already and lost the answer.
     """
     for _, outcome in outcomes:
         if outcome.status not in (Status.SCORED, Status.REJECTED):
             raise ValueError(f"a run ends as SCORED or REJECTED, not as {outcome.status}")
     with transaction.atomic():
-        held = _locked([lease for lease, _ in outcomes])
-        decided = [(lease, outcome) for lease, outcome in outcomes if lease.evaluation_id in held]
+        valid_ids = _locked([lease for lease, _ in outcomes])
+        decided = [(lease, outcome) for lease, outcome in outcomes if lease.evaluation_id in valid_ids]
         for lease, outcome in decided:
             Evaluation.objects.filter(pk=lease.evaluation_id).update(
                 status=outcome.status,
@@ -254,8 +256,8 @@ def _locked(leases: Sequence[Lease]) -> set[uuid.UUID]:
     ids = [lease.evaluation_id for lease in leases]
     rows = Evaluation.objects.select_for_update(no_key=True).filter(pk__in=ids, status=Status.RUNNING)
     # Every batch locks in the same order, so that two cannot wait for each other.
-    found = rows.order_by("pk").values_list("pk", "attempt", "lease_token")
-    return {row[0] for row in found if row in valid}
+    running = rows.order_by("pk").values_list("pk", "attempt", "lease_token")
+    return {row[0] for row in running if row in valid}
 
 
 def fail_attempt(
@@ -267,7 +269,7 @@ def fail_attempt(
     no longer valid.
     """
     with transaction.atomic():
-        evaluation = _held(lease).select_for_update(no_key=True).first()
+        evaluation = _leased_row(lease).select_for_update(no_key=True).first()
         if evaluation is None:
             raise LostRace(f"evaluation {lease.evaluation_id}: attempt {lease.attempt} is no longer valid")
         return _strike(evaluation, strike=strike, reason=reason, rng=rng, is_last=is_last)
@@ -279,8 +281,8 @@ def release(leases: Sequence[Lease]) -> int:
     Leases that are no longer valid are left alone.
     """
     with transaction.atomic():
-        held = _locked(leases)
-        running = Evaluation.objects.filter(pk__in=held, status=Status.RUNNING)
+        valid_ids = _locked(leases)
+        running = Evaluation.objects.filter(pk__in=valid_ids, status=Status.RUNNING)
         return running.update(status=Status.QUEUED, leased_until=None)
 
 

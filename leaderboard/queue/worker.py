@@ -88,7 +88,7 @@ def _claimed() -> list[Lease]:
         lease_s=settings.LEASE_S,
         wall_s=settings.WALL_S,
         in_batches=True,
-        held=truth_values.readable_digests(),
+        readable_truths=truth_values.readable_digests(),
     )
 
 
@@ -101,8 +101,8 @@ def _release(waiting: deque[Lease]) -> None:
 
 def _evaluations(leases: Sequence[Lease]) -> list[Evaluation]:
     ids = [lease.evaluation_id for lease in leases]
-    found = Evaluation.objects.select_related("submission", "edition__ground_truth").in_bulk(ids)
-    return [found[pk] for pk in ids]
+    by_id = Evaluation.objects.select_related("submission", "edition__ground_truth").in_bulk(ids)
+    return [by_id[pk] for pk in ids]
 
 
 def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
@@ -222,7 +222,7 @@ def run(
 
 
 class Heartbeat:
-    """The heartbeat of one run: False once the work is somebody else's, or its time is up.
+    """The heartbeat of one run: False once another worker has the work, or its time is up.
 
     A database that does not answer says neither. A run with a heartbeat keeps nothing waiting behind it.
     """
@@ -274,7 +274,7 @@ def _in_words(fault: Exception) -> str:
 
 
 def scored(report: Report, *, decimals: int, warnings: Sequence[FileWarning] = ()) -> RunResult:
-    """A report as its edition publishes it: values with so many decimals, counts, and nothing finer.
+    """A report as its edition publishes it: values with `decimals` decimals, counts, and nothing finer.
 
     `warnings` are those that file and manifest give: others would tell of hidden values.
     """

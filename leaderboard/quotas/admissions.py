@@ -80,7 +80,7 @@ def refusal_for_all(split: Split, *, now: datetime) -> Refused | None:
 
 
 def is_open(split: Split, *, now: datetime) -> bool:
-    """Whether the split takes submissions, from whoever has a slot left."""
+    """Whether the split takes submissions from teams that have a slot left."""
     return refusal_for_all(split, now=now) is None
 
 

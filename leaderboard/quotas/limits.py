@@ -92,7 +92,7 @@ def rules_of(*, team: Team | None, split: Split) -> QuotaRules:
 
 
 def state(*, team: Team | None, user: User, split: Split, now: datetime) -> Quota:
-    """What the team has left on the split; of somebody without a team, what they themselves have."""
+    """The team's quota on the split; that of the user if they have no team."""
     rules = rules_of(team=team, split=split)
     spent, rejected = _spent(team=team, user=user, split=split, rules=rules, now=now)
     return weigh(split=split, rules=rules, spent=spent, rejected=rejected, now=now)
@@ -226,7 +226,7 @@ def weigh(
     elif opens_at is None:
         sentence = _left(rules, n_used=len(in_window))
     else:
-        said = {
+        why = {
             full_until: f"Your team has used {counted(rules.quota_limit or 0, 'submission')} to {split.pk}, "
             f"its quota for {span(rules.quota_window)}",
             gap_until: f"Submissions of a team to {split.pk} must be at least "
@@ -235,7 +235,7 @@ def weigh(
             f"{counted(len(rejected), 'file')} that were rejected, were cancelled, or stopped the process "
             "that read them",
         }
-        sentence = f"{said[opens_at]}; the next slot opens at {_minute_after(opens_at):%Y-%m-%d %H:%M} UTC."
+        sentence = f"{why[opens_at]}; the next slot opens at {_minute_after(opens_at):%Y-%m-%d %H:%M} UTC."
     return Quota(
         split=split.pk,
         rules=rules,
@@ -256,16 +256,16 @@ def _until(times: Sequence[datetime], *, limit: int | None, window: timedelta) -
 
 def _left(rules: QuotaRules, *, n_used: int) -> str:
     if rules.quota_limit is None:
-        said = "No limit"
+        text = "No limit"
     else:
         n_left = max(0, rules.quota_limit - n_used)
         limit = counted(rules.quota_limit, "submission")
-        said = f"{n_left} of {limit} left within {span(rules.quota_window)}"
-    return f"{said}, at least {span(rules.quota_min_gap)} apart." if rules.quota_min_gap else f"{said}."
+        text = f"{n_left} of {limit} left within {span(rules.quota_window)}"
+    return f"{text}, at least {span(rules.quota_min_gap)} apart." if rules.quota_min_gap else f"{text}."
 
 
 def _minute_after(at: datetime) -> datetime:
-    """The first whole minute that is not before this moment: whoever waits until then is not early."""
+    """The first whole minute that is not before this moment."""
     whole = at.replace(second=0, microsecond=0)
     return whole if whole == at else whole + timedelta(minutes=1)
 
@@ -309,13 +309,13 @@ def override(
         row, _ = QuotaOverride.objects.update_or_create(
             team=team, split=split, defaults={**rules, "reason": reason, "set_by": actor, "set_at": now}
         )
-        told = {name: str(value) if isinstance(value, timedelta) else value for name, value in rules.items()}
+        texts = {name: str(value) if isinstance(value, timedelta) else value for name, value in rules.items()}
         audit.record(
             verb="quota_overridden",
             noun="Team",
             noun_id=team.pk,
             actor=actor,
-            details={"split": split.pk, "reason": reason, **told},
+            details={"split": split.pk, "reason": reason, **texts},
         )
     return row
 

@@ -48,5 +48,5 @@ def longest_window() -> timedelta:
 def _digests(people: QuerySet[User]) -> set[str]:
     """The keyed hashes of their mailboxes: that of the primary address, and of every proved one."""
     proved = EmailAddress.objects.filter(user__in=people, verified=True).annotate(mailbox=MAILBOX)
-    found = people.values_list("mailbox", flat=True).union(proved.values_list("mailbox", flat=True))
-    return {salted_hmac(__name__, mailbox, algorithm="sha256").hexdigest() for mailbox in found}
+    mailboxes = people.values_list("mailbox", flat=True).union(proved.values_list("mailbox", flat=True))
+    return {salted_hmac(__name__, mailbox, algorithm="sha256").hexdigest() for mailbox in mailboxes}

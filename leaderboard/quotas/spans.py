@@ -37,15 +37,15 @@ _SPAN: Final = re.compile(rf"\s*([\d,]{{1,12}})\s*({'|'.join(_UNITS)})s?\s*", re
 
 def parse_span(text: str, *, field: str = "") -> timedelta:
     """The span of a text such as `quotas.span` writes, also of none (0 days). Raises `Refused`."""
-    found = _SPAN.fullmatch(text)
-    number = found[1].replace(",", "") if found else ""
-    if found is None or not number:
+    match = _SPAN.fullmatch(text)
+    number = match[1].replace(",", "") if match else ""
+    if match is None or not number:
         raise Refused(
             "bad-value",
             f"{text.strip()[:40]!r} is not a span of time; expected one like 30 days or 90 minutes.",
             field=field,
         )
-    n, unit = int(number), _UNITS[found[2].lower()]
+    n, unit = int(number), _UNITS[match[2].lower()]
     if n > MAX_SPAN // unit:
         raise Refused(
             "bad-value",

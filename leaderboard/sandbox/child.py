@@ -74,21 +74,21 @@ def read_predictions(
     read = _forked if fork_server.AVAILABLE else _spawned
     max_bytes = MAX_WORDS_BYTES + 8 * manifest.n_sequences
     try:
-        found = read(source, request, max_bytes=max_bytes, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
+        reply = read(source, request, max_bytes=max_bytes, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
     except fork_server.TooMuch:
         raise ChildDied(f"reading the file gave an answer of more than {max_bytes:,} bytes") from None
-    if not found.output.startswith(READY):
-        raise ChildNotReady(f"the reading process did not start: {_cause(found.returncode, found.complaint)}")
-    if found.returncode == -signal.SIGXCPU:
+    if not reply.output.startswith(READY):
+        raise ChildNotReady(f"the reading process did not start: {_cause(reply.returncode, reply.complaint)}")
+    if reply.returncode == -signal.SIGXCPU:
         raise ChildOutOfTime(f"reading the file took more than {cpu_s} s of processor time")
-    if found.returncode != 0:
-        raise ChildDied(f"reading the file {_cause(found.returncode, found.complaint)}")
-    return _decoded(found.output[len(READY) :], manifest=manifest, digest=digest)
+    if reply.returncode != 0:
+        raise ChildDied(f"reading the file {_cause(reply.returncode, reply.complaint)}")
+    return _decoded(reply.output[len(READY) :], manifest=manifest, digest=digest)
 
 
 @cache
 def _say_what_is_missing() -> None:
-    """Once for each process: a child goes on with its limits alone."""
+    """Warn, once for each process, that children run with their limits alone."""
     why = system_calls.why_unavailable()
     if why is not None:
         log.warning("readers_without_a_filter_of_system_calls", reason=why)
@@ -155,7 +155,7 @@ def _spawned(
 
 
 def _at_most(pipe: IO[bytes] | None, max_bytes: int) -> bytes:
-    """All that comes through the pipe. Raises `TooMuch`; whoever writes on finds the pipe closed."""
+    """All that comes through the pipe. Raises `TooMuch` above `max_bytes`; the pipe is closed then."""
     if pipe is None:
         raise RuntimeError("the reading process was started without pipes")
     with pipe:

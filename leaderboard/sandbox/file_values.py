@@ -28,18 +28,18 @@ def saved(file: SentFile, edition: Edition) -> Predictions | None:
     `OSError` if the private directory or the store does not answer.
     """
     manifest = truth_values.load(edition.ground_truth_id).manifest
-    n_sent, places, missing = _places(file.manifest_digest, edition.ground_truth_id)
+    n_sent, order, missing = _sent_order(file.manifest_digest, edition.ground_truth_id)
     if len(missing):
         raise absent(missing, manifest=manifest)
     ascending = files.load_aligned(file, n_sequences=n_sent)
     if ascending is None:
         return None
-    ttc_s = ascending if places is None else ascending[places]
+    ttc_s = ascending if order is None else ascending[order]
     return Predictions(manifest=manifest, ttc_s=ttc_s, digest=file.digest)
 
 
 @lru_cache(maxsize=16)
-def _places(own_digest: str, truth_digest: str) -> tuple[int, Rows | None, Rows]:
+def _sent_order(own_digest: str, truth_digest: str) -> tuple[int, Rows | None, Rows]:
     """How many values a file for this manifest has, and where among them, in ascending anno_id, each is.
 
     (n,) in the order of the ground truth; None where that is the order of the values. And the rows of the
@@ -48,11 +48,11 @@ def _places(own_digest: str, truth_digest: str) -> tuple[int, Rows | None, Rows]
     manifest = truth_values.load(truth_digest).manifest
     own = manifest if manifest.digest == own_digest else manifests.load(own_digest)
     rows = rows_in(own, manifest)
-    place_of_row: NDArray[np.intp] = np.empty(own.n_sequences, dtype=np.intp)
-    place_of_row[own.rows_by_id] = np.arange(own.n_sequences)
-    places = place_of_row[rows]
-    is_same_order = own.n_sequences == len(places) and bool(np.array_equal(places, np.arange(len(places))))
-    return own.n_sequences, None if is_same_order else places, np.flatnonzero(rows < 0)
+    index_of_row: NDArray[np.intp] = np.empty(own.n_sequences, dtype=np.intp)
+    index_of_row[own.rows_by_id] = np.arange(own.n_sequences)
+    order = index_of_row[rows]
+    is_same_order = own.n_sequences == len(order) and bool(np.array_equal(order, np.arange(len(order))))
+    return own.n_sequences, None if is_same_order else order, np.flatnonzero(rows < 0)
 
 
 def read(file: SentFile, edition: Edition, *, heartbeat: Callable[[], bool] = lambda: True) -> Predictions:

@@ -44,9 +44,9 @@ def for_submission(*, submission: Submission, viewer: User | AnonymousUser) -> A
 # --- a worker's work -------------------------------------------------------------------------------------
 
 
-def missing(*, held: Collection[str]) -> QuerySet[Evaluation]:
-    """What stands on the board of an open split and has no analysis, the newest first."""
-    opened = [digest for digest in held if not hidden_marks.is_marked(digest)]
+def missing(*, readable_truths: Collection[str]) -> QuerySet[Evaluation]:
+    """Entries on the board of an open split without an analysis, the newest first."""
+    opened = [digest for digest in readable_truths if not hidden_marks.is_marked(digest)]
     boards = Split.objects.filter(is_hidden=False, published_edition__ground_truth__in=opened)
     return (
         Evaluation.objects.filter(

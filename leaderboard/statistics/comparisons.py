@@ -41,7 +41,7 @@ class BadComparison(Exception):
 
 
 class UnknownMethod(BadComparison):
-    """A method that there is not, or that this reader may not see: the two are not told apart."""
+    """A method that does not exist or that this reader may not see; the answer is the same."""
 
     code = "unknown-method"
 
@@ -90,9 +90,9 @@ class Pair:
         )
 
     def influence(self) -> str:
-        """On how few recordings the difference in MiD rests; empty where that is not told."""
-        found = (self.differences or {}).get(PRIMARY)
-        return sentences.influence(self.first.method, self.second.method, found=found) if found else ""
+        """On how few recordings the difference in MiD rests; empty where that is withheld."""
+        gap = (self.differences or {}).get(PRIMARY)
+        return sentences.influence(self.first.method, self.second.method, found=gap) if gap else ""
 
     def others(self) -> str:
         """How many columns besides overall MiD differ significantly."""
@@ -199,7 +199,7 @@ def _chosen(board: listing.Board, methods: Sequence[UUID], viewer: User | Anonym
 
 
 def _withheld(edition: Edition, pairs: Sequence[tuple[Entry, Entry]]) -> dict[Key, str]:
-    """By their keys the pairs of which no interval and no p is told, and why."""
+    """Why the interval and p of a pair are withheld, by its key; no other pairs."""
     whys = {_key(pair): disclosure.why_withheld(*pair, edition=edition) for pair in pairs}
     return {key: why for key, why in whys.items() if why}
 
@@ -240,25 +240,25 @@ def _is_asked_for(row: Comparison | None) -> bool:
 def _pairs(
     asked: Sequence[tuple[Entry, Entry]], known: Mapping[Key, Comparison], withheld: Mapping[Key, str]
 ) -> tuple[Pair, ...]:
-    found = []
+    pairs = []
     for first, second in asked:
         key = _key((first, second))
         row = known.get(key)
         if key in withheld:
             # Everybody can take these differences from the board.
             shown = _differences_of_values(first.scores, second.scores, decimals=first.decimals)
-            found.append(Pair(first, second, shown, withheld=withheld[key]))
+            pairs.append(Pair(first, second, shown, withheld=withheld[key]))
         elif row is None or row.differences is None:
-            found.append(Pair(first, second, None))
+            pairs.append(Pair(first, second, None))
         else:
-            kept = {name: _told(row.differences[name]) for name in first.scores if name in row.differences}
+            kept = {name: _parsed(row.differences[name]) for name in first.scores if name in row.differences}
             if row.first_id != first.evaluation_id:
                 kept = {name: gap.turned() for name, gap in kept.items()}
-            found.append(Pair(first, second, kept, withheld=row.differences.get(WITHHELD, "")))
-    return tuple(found)
+            pairs.append(Pair(first, second, kept, withheld=row.differences.get(WITHHELD, "")))
+    return tuple(pairs)
 
 
-def _told(kept: Mapping[str, Any]) -> Difference:
+def _parsed(kept: Mapping[str, Any]) -> Difference:
     known = kept.get("influence")
     return Difference(**{**kept, "influence": Influence(**known) if known else None})
 
@@ -267,7 +267,7 @@ def _told(kept: Mapping[str, Any]) -> Difference:
 
 
 def compute(row: Comparison, *, now: datetime) -> None:
-    """Compare the two entries of a row, unit by unit, and write what came of it, once.
+    """Compare the two entries of a row, unit by unit, and write their differences, once.
 
     Raises what `bags.sums_of` raises; the row waits on then.
     """
@@ -279,18 +279,18 @@ def compute(row: Comparison, *, now: datetime) -> None:
         shown = _differences_of_values(one, other, decimals=row.edition.decimals)
     else:
         shown = _differences(row, one, other)
-    told = {name: asdict(gap) for name, gap in shown.items()} | ({WITHHELD: withheld} if withheld else {})
-    Comparison.objects.filter(pk=row.pk, computed_at=None).update(differences=told, computed_at=now)
+    kept = {name: asdict(gap) for name, gap in shown.items()} | ({WITHHELD: withheld} if withheld else {})
+    Comparison.objects.filter(pk=row.pk, computed_at=None).update(differences=kept, computed_at=now)
 
 
 def _differences(
     row: Comparison, one: Mapping[str, float | None], other: Mapping[str, float | None]
 ) -> dict[str, Difference]:
-    """What is told of each column between these published values, with its interval and p."""
+    """The published difference of each column between these values, with its interval and p."""
     edition = row.edition
     sent = (row.first.submission.sent_file, row.second.submission.sent_file)
     first, second = (recording_sums.unit_sums_of(edition, file=file) for file in sent)
-    found = differences.difference(
+    by_column = differences.difference(
         first,
         second,
         recording_sums.unit_counts_of(edition),
@@ -300,8 +300,8 @@ def _differences(
     )
     if not disclosure.is_hidden(edition):
         # Each count would tell more of hidden labels, and of the recordings that a file was made to favour.
-        found = differences.with_influence(
-            found,
+        by_column = differences.with_influence(
+            by_column,
             differences=first - second,
             counts=recording_sums.unit_counts_of(edition),
             names=edition.rules.score_names,
@@ -315,5 +315,5 @@ def _differences(
             ),
             edition=edition,
         )
-        for name, gap in found.items()
+        for name, gap in by_column.items()
     }

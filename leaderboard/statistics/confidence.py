@@ -1,7 +1,7 @@
 """Uncertainty of an edition: a confidence interval for every value, a rank range for every rank.
 
 Workers make them from sums per unit (day or recording), which never leave their private directory. An
-interval belongs to one evaluation and stays; ranges belong to all entries of a board and are made anew when
+interval belongs to one evaluation and stays; ranges belong to all entries of a board and are made again when
 those change, which a digest tells. `docs/uncertainty.md` says how and why.
 """
 
@@ -16,7 +16,8 @@ from uuid import UUID
 import numpy as np
 import structlog
 from django.db import transaction
-from django.db.models import Exists, OuterRef
+from django.db.models import Exists, OuterRef, Q
+from django.db.models.functions import Now
 from numpy.typing import NDArray
 
 from evaluator import rounded
@@ -26,6 +27,7 @@ from evaluator.scoring.ranges import Quoted, rank_ranges
 from evaluator.scoring.significance import MIN_DEGREES, cut_off, too_few_units
 from leaderboard import board_versions
 from leaderboard.boards.rows import printed_decimals
+from leaderboard.db import clock
 from leaderboard.models import (
     Edition,
     EditionRanges,
@@ -43,7 +45,9 @@ log = structlog.get_logger(__name__)
 
 Floats = NDArray[np.float64]
 # While an edition is being scored its entries change all the time; its ranges follow once a minute.
-PATIENCE = timedelta(minutes=1)
+MAX_DELAY = timedelta(minutes=1)
+# A worker that dies while it computes leaves the work to others after this time.
+CLAIM_S = 300.0
 # By the evaluation's id, of every column both ends, or None where there is no range.
 Ranges = dict[str, list[list[int] | None]]
 
@@ -71,7 +75,7 @@ def generator_of(edition: Edition, *, purpose: str) -> np.random.Generator:
 
 
 def active_entries(edition: Edition) -> list[ScoredEntry]:
-    """Everything that stands in an edition, private methods included: one query."""
+    """The scored, active entries of an edition, private methods included: one query."""
     rows = Score.objects.filter(
         evaluation__edition=edition,
         evaluation__status=Status.SCORED,
@@ -111,7 +115,7 @@ def _printed(edition: Edition) -> list[tuple[float, ...]]:
 
 @dataclass(frozen=True)
 class Entries:
-    """What stands in an edition, read once for all that a worker does with it."""
+    """The entries of an edition, read once for all that a worker does with them."""
 
     edition: Edition
     rows: tuple[ScoredEntry, ...]
@@ -129,13 +133,13 @@ class Entries:
 
     @cached_property
     def digest(self) -> str:
-        """Names what intervals and ranges are made of. It knows of private entries: for nobody's eyes."""
+        """The digest of the inputs of intervals and ranges. It depends on private entries: never show it."""
         rivals = {row.evaluation_id for row in self.ranked}
         return self._digest([f"{row.evaluation_id} {row.evaluation_id in rivals}" for row in self.rows])
 
     @cached_property
     def ranked_digest(self) -> str:
-        """Names what ranges are made of: nothing that is private is in it."""
+        """The digest of the inputs of ranges, public entries only."""
         return self._digest([str(row.evaluation_id) for row in self.ranked])
 
     def _digest(self, lines: Sequence[str]) -> str:
@@ -145,25 +149,25 @@ class Entries:
 
     @property
     def have_ranges(self) -> bool:
-        """Whether all that workers make of an edition beside its scores is there, and of these entries."""
+        """Whether floor and ranges of the edition are there, and made of these entries."""
         return self.edition.floor is not None and self.edition.inference_digest == self.digest
 
 
-def stale(*, now: datetime, held: Collection[str]) -> Iterator[Entries]:
-    """The entries of editions whose ranges were made of others, each read when it is asked for.
+def stale(*, now: datetime, readable_truths: Collection[str]) -> Iterator[Entries]:
+    """The entries of editions whose ranges are out of date, read one edition at a time.
 
-    Only those whose ground truth is `held`, among these digests: what this worker can do. An edition in
-    which something is still to be scored has patience.
+    Only those whose ground truth is among `readable_truths` (digests). An edition in which something is still
+    to be scored waits for `MAX_DELAY`.
     """
     undecided = Evaluation.objects.filter(edition=OuterRef("pk"), status__in=[Status.QUEUED, Status.RUNNING])
-    found = (
-        Edition.objects.filter(discarded_at=None, ground_truth__in=held)
+    editions = (
+        Edition.objects.filter(discarded_at=None, ground_truth__in=readable_truths)
         .select_related("ground_truth", "split")
         .annotate(is_busy=Exists(undecided))
         .order_by("pk")
     )
-    for edition in found:
-        if edition.is_busy and now - (edition.inferred_at or edition.opened_at) < PATIENCE:
+    for edition in editions:
+        if edition.is_busy and now - (edition.inferred_at or edition.opened_at) < MAX_DELAY:
             continue
         entries = Entries.of(edition)
         if not entries.have_ranges:
@@ -176,17 +180,27 @@ def stale(*, now: datetime, held: Collection[str]) -> Iterator[Entries]:
 def infer(entries: Entries, *, now: datetime, between: Callable[[], None] = lambda: None) -> bool:
     """Make what is missing of an edition's intervals and, of other entries, its rank ranges. Whether it did.
 
-    False: they hold already, or the entries have changed since they were read, or another worker has written
-    theirs meanwhile. `between` is called every fraction of a second. Raises what `recording_sums.sums_of`
-    raises.
+    False: they hold already, another worker computes them, or the entries have changed since they were read.
+    `between` is called every fraction of a second. Raises what `recording_sums.sums_of` raises.
     """
-    if entries.have_ranges:
+    if entries.have_ranges or not _claim(entries.edition):
         return False
-    intervals = _intervals(entries, between=between)
-    ranges = _ranges(entries, between=between)
-    is_written = _write(entries, intervals=intervals, ranges=ranges, now=now)
+    try:
+        intervals = _intervals(entries, between=between)
+        ranges = _ranges(entries, between=between)
+        is_written = _write(entries, intervals=intervals, ranges=ranges, now=now)
+    finally:
+        EditionRanges.objects.filter(edition=entries.edition).update(claimed_until=None)
     log.info("inferred", edition=str(entries.edition), n_entries=len(entries.rows), is_written=is_written)
     return is_written
+
+
+def _claim(edition: Edition) -> bool:
+    """Let no other worker compute the edition's: of a thousand entries it takes a processor for minutes."""
+    row, _ = EditionRanges.objects.get_or_create(edition=edition)
+    is_free = Q(claimed_until=None) | Q(claimed_until__lte=Now())
+    ends = clock.after(CLAIM_S)
+    return bool(EditionRanges.objects.filter(is_free, pk=row.pk).update(claimed_until=ends))
 
 
 def _intervals(entries: Entries, *, between: Callable[[], None]) -> list[Score]:
@@ -223,7 +237,7 @@ def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Rang
     sums = np.empty((len(rivals), *counts.shape))
     for i, row in enumerate(rivals):
         sums[i] = recording_sums.unit_sums_of(edition, file=row.file)
-    found = rank_ranges(
+    ranks = rank_ranges(
         sums,
         published=_published_values(edition, [row.evaluation_id for row in rivals]),
         usable=uncertainty.usable_columns(counts),
@@ -231,7 +245,7 @@ def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Rang
         quoted=_quoted(entries, counts),
         between=between,
     )
-    ends = np.stack([found.low, found.high], axis=2).tolist()
+    ends = np.stack([ranks.low, ranks.high], axis=2).tolist()
     return digest, {
         str(row.evaluation_id): [pair if pair[0] else None for pair in columns]
         for row, columns in zip(rivals, ends, strict=True)
@@ -280,7 +294,7 @@ def _bootstrap(seed: str, counts: bytes, shape: tuple[int, ...]) -> uncertainty.
 def _write(
     entries: Entries, *, intervals: list[Score], ranges: tuple[str, Ranges] | None, now: datetime
 ) -> bool:
-    """Write what was made, all or nothing, if the entries are still the same.
+    """Write intervals and ranges, all or none, if the entries are still the same.
 
     They are read for the second time here, with the edition locked: the comparison of compare-and-set. Scores
     need not be: a score does not change, and only who has the edition locked writes beside it.

@@ -1,4 +1,4 @@
-"""Disclosure: how finely intervals and p-values of hidden splits are published, and of which pairs.
+"""Disclosure: how finely intervals and p-values of hidden splits are published, and for what pairs.
 
 Each number that follows from hidden labels tells of them, and a file can be made to be read through such
 numbers. Of a hidden split the ends of intervals are therefore rounded outwards to about a tenth of their
@@ -76,16 +76,16 @@ def published_ends(low: Floats, high: Floats, *, edition: Edition) -> tuple[Floa
     return shown[:, 0].reshape(low.shape), shown[:, 1].reshape(high.shape)
 
 
-def published_difference(found: Difference, shown: Difference, *, edition: Edition) -> Difference:
-    """A difference as an edition publishes it: `found` as it was computed, `shown` rounded to its decimals.
+def published_difference(computed: Difference, shown: Difference, *, edition: Edition) -> Difference:
+    """A difference as an edition publishes it: `computed` unrounded, `shown` rounded to its decimals.
 
     Of a hidden split the ends are coarse and p is only a class. The ends are rounded outwards, to 0 as well,
     so that the interval holds what the computed one holds. So 0 may be an end although p is below 0.05, and
     `p_below` alone says what is significant.
     """
-    if found.low is None or found.high is None or not is_hidden(edition):
+    if computed.low is None or computed.high is None or not is_hidden(edition):
         return shown
-    low, high = coarse_ends(found.low, found.high, decimals=edition.decimals)
+    low, high = coarse_ends(computed.low, computed.high, decimals=edition.decimals)
     low, high = min(low, shown.difference), max(high, shown.difference)
     return replace(shown, low=low, high=high, p=None)
 
@@ -94,7 +94,7 @@ def published_difference(found: Difference, shown: Difference, *, edition: Editi
 
 
 def why_withheld(first: Entry, second: Entry, *, edition: Edition) -> str:
-    """Why nothing but the difference of the published values is told of a pair, in a sentence; "" if more is.
+    """Why interval and p of a pair are withheld, in a sentence; "" if they are published.
 
     Entries are as their reader sees them.
     """

@@ -1,4 +1,4 @@
-"""The queue of comparisons: first come, first served; those that nobody has asked for come last."""
+"""The queue of comparisons: first come, first served; those without a request come last."""
 
 import math
 from collections.abc import Collection, Sequence
@@ -31,7 +31,7 @@ class AskedTooOften(Exception):
 
 
 class NewComparisons(rate_limits.Throttle):
-    """Comparisons that nobody has asked for before, of one account or address."""
+    """The rate of comparisons not asked for before, of one account or address."""
 
     rates, scope = "PAGE_RATES", "compare"
 
@@ -55,7 +55,7 @@ def ask(
 
 
 def note(*, edition: Edition, pairs: Sequence[Key]) -> None:
-    """Have these pairs of evaluations compared when nothing waits that somebody asked for."""
+    """Queue comparisons of these pairs of evaluations, behind all that a user asked for."""
     _write(edition=edition, pairs=pairs, asked_at=None)
 
 
@@ -80,9 +80,9 @@ def _write(*, edition: Edition, pairs: Sequence[Key], asked_at: datetime | None)
         transaction.on_commit(broker.work_off, robust=True)
 
 
-def waiting(*, held: Collection[str]) -> QuerySet[Comparison]:
-    """What is not computed, in the order in which it is to be, against ground truth of `held`."""
-    rows = Comparison.objects.filter(computed_at=None, edition__ground_truth__in=held)
+def waiting(*, readable_truths: Collection[str]) -> QuerySet[Comparison]:
+    """Comparisons still to be computed, in order, whose ground truth is in `readable_truths` (digests)."""
+    rows = Comparison.objects.filter(computed_at=None, edition__ground_truth__in=readable_truths)
     return rows.order_by(F("asked_at").asc(nulls_last=True), "pk")
 
 

@@ -1,7 +1,7 @@
-"""Sums per recording, saved in the private directory of workers, beside the ground truth.
+"""Sums per recording, saved in the private directory of workers, next to the ground truth.
 
 They are made when a file is scored, and are all that intervals, rank ranges and comparisons need. What is
-missing, as on another worker, is made anew from the submission's values. An edition's units are days or
+missing, as on another worker, is made again from the submission's values. An edition's units are days or
 recordings: whole recordings added up.
 """
 
@@ -67,7 +67,7 @@ def load(edition: Edition, *, file: SentFile) -> Floats | None:
 
 
 def sums_of(edition: Edition, *, file: SentFile) -> Floats:
-    """The sums of a scored file, kept or made anew, (G, columns).
+    """The sums of a scored file, kept or made again, (G, columns).
 
     Raises what `file_values.read` raises.
     """

@@ -37,7 +37,7 @@ class StoreAway(OSError):
 
 
 class Rebuildable(ContentFile):
-    """What is made anew where it is missing or damaged: it need not be on the disk before `save` returns."""
+    """Content that can be made again: it need not be on the disk before `save` returns."""
 
 
 class DurableFileSystemStorage(FileSystemStorage):
@@ -54,11 +54,11 @@ class DurableFileSystemStorage(FileSystemStorage):
 
     def exists(self, name: str) -> bool:
         """Whether the file is there, and would still be after a power cut."""
-        found = super().exists(name)
-        if found:
+        is_there = super().exists(name)
+        if is_there:
             # Whoever renamed it may have been killed before the directory was on the disk.
             self._settle(Path(self.path(name)))
-        return found
+        return is_there
 
     def _save(self, name: str, content: "File[bytes]") -> str:
         target = Path(self.path(name))
@@ -111,7 +111,7 @@ class DurableFileSystemStorage(FileSystemStorage):
         return False
 
     def leftovers(self) -> Iterator[Path]:
-        """What was begun more than an hour ago: nobody writes a file of a few megabytes for so long."""
+        """Unfinished files that are older than `LEFTOVER_S`: no process still writes them."""
         for entry in (Path(self.location) / INCOMING).glob("*"):
             # Another process may be tidying up too.
             with suppress(FileNotFoundError):
@@ -129,7 +129,7 @@ class StoredFile:
 
 @contextmanager
 def replacing(target: Path) -> Iterator[Path]:
-    """A file beside `target` to be written, for its owner only; it takes its place once it is on the disk."""
+    """A file next to `target` to write, for its owner only; it replaces `target` once it is on the disk."""
     target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     handle, temporary = tempfile.mkstemp(dir=target.parent, suffix=target.suffix)
     os.close(handle)
@@ -138,7 +138,7 @@ def replacing(target: Path) -> Iterator[Path]:
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
-    # Else a power cut could leave a file that is never made anew, because it is there.
+    # Else a power cut could leave a damaged file that is never replaced, because it is there.
     with Path(temporary).open("rb") as written:
         os.fsync(written.fileno())
     Path(temporary).replace(target)

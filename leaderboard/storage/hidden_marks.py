@@ -1,4 +1,4 @@
-"""Marks of hidden ground truth: a file beside the values says that they were imported as hidden ones.
+"""Marks of hidden ground truth: a file next to the values says that they were imported as hidden ones.
 
 Who can write into the database could call a split open. The private directory tells workers otherwise, and
 only workers and the maintainers' commands can ask it.

@@ -106,15 +106,15 @@ def _remove_unnamed(digest: str) -> bool:
 
 
 def lock(digest: str) -> None:
-    """Let nobody remove a file of this digest until the transaction ends; others may hold it as well.
+    """Prevent removal of a file of this digest until the transaction ends; others may hold it as well.
 
-    It is the first lock of its transaction, so whoever removes one keeps nobody waiting who has another.
+    It is the first lock of its transaction, so that a removal never waits for a holder of other locks.
     """
     _lock("pg_advisory_xact_lock_shared", digest)
 
 
 def _locked_alone(digest: str) -> bool:
-    """Whether nobody else holds the file, which stays so until the transaction ends."""
+    """Lock the file alone until the transaction ends. False if another process holds it."""
     return _lock("pg_try_advisory_xact_lock", digest)
 
 

@@ -140,7 +140,7 @@ class S3FileStore(S3Storage):
             super().delete(name)
 
     def delete_if_older(self, name: str, than: datetime) -> bool:
-        """Remove a file unless it was written after `than`; whether it was removed.
+        """Remove a file unless it was written after `than`. Returns whether it was removed.
 
         S3 has no rename, so a file that is written again between the question and the removal is removed too.
         Whoever wrote it looks again before a row names it (`leaderboard/storage/orphans.py`).

@@ -26,7 +26,7 @@ class NoSecret(OSError):
 
 
 def path() -> Path:
-    """Where the secret is: beside the ground truth, and to be kept in the same backup."""
+    """The path of the secret: next to the ground truth, to be kept in the same backup."""
     return Path(settings.GROUND_TRUTH_DIR) / "seed.key"
 
 
@@ -54,17 +54,17 @@ def ensure() -> None:
 def _secret() -> bytes:
     try:
         ensure()
-        found = bytes.fromhex(path().read_text(encoding="ascii"))
+        secret = bytes.fromhex(path().read_text(encoding="ascii"))
     except ValueError:
-        found = b""
+        secret = b""
     except OSError as fault:
         raise NoSecret(
             f"The secret {path().name} beside the ground truth is not readable, and cannot be made here "
             f"({fault.strerror}); make it where the ground truth is written: manage.py make_seed_key"
         ) from fault
-    if len(found) != N_BYTES:
+    if len(secret) != N_BYTES:
         raise NoSecret(
-            f"The secret {path().name} beside the ground truth is damaged: found {len(found)} bytes in "
+            f"The secret {path().name} beside the ground truth is damaged: found {len(secret)} bytes in "
             f"hexadecimal digits, expected {N_BYTES}; put it back from the backup of the ground truth."
         )
-    return found
+    return secret

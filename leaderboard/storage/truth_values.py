@@ -42,10 +42,10 @@ def save(truth: evaluator.GroundTruth, *, is_hidden: bool) -> None:
 def readable_digests() -> frozenset[str]:
     """The digests whose values this process can read: what it may take on. Empty without any access."""
     try:
-        found = list(Path(settings.GROUND_TRUTH_DIR).iterdir())
+        paths = list(Path(settings.GROUND_TRUTH_DIR).iterdir())
     except OSError:
         return frozenset()
-    values = (path for path in found if path.suffix == ".npz" and not path.stem.endswith(".manifest"))
+    values = (path for path in paths if path.suffix == ".npz" and not path.stem.endswith(".manifest"))
     return frozenset(f"sha256:{path.stem}" for path in values if os.access(path, os.R_OK))
 
 

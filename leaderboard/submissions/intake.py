@@ -201,9 +201,9 @@ def _token_split(method: Method, changes: Mapping[str, str]) -> Refused:
 
 
 def _sent_before(file: files.StoredFile, *, split: Split, method: Method) -> Submission | None:
-    """The standing submission of the same bytes under the manifest that is public now."""
+    """The active submission of the same bytes under the manifest that is public now."""
     names = _sent_file(file, split)._asdict()
-    return Submission.objects.standing().filter(split=split, method=method, **names).first()
+    return Submission.objects.active().filter(split=split, method=method, **names).first()
 
 
 def _sent_file(file: files.StoredFile, split: Split) -> SentFile:
@@ -240,7 +240,7 @@ def withdraw(*, submission: Submission, actor: User, now: datetime) -> bool:
     if not submission.method.team.memberships.filter(user=actor).exists():
         raise Refused("not-yours", "Only the team that sent a submission can withdraw it.")
     with transaction.atomic():
-        changed = Submission.objects.standing().filter(pk=submission.pk).update(withdrawn_at=now)
+        changed = Submission.objects.active().filter(pk=submission.pk).update(withdrawn_at=now)
         if not changed:
             return False
         lifecycle.cancel(submission=submission, actor=actor)

@@ -16,7 +16,7 @@ from leaderboard.models import Edition, Evaluation, Score, Status, Submission, V
 from leaderboard.statistics import confidence
 from leaderboard.submissions.progress import Progress, evaluation_of, progress_of
 
-# For so long somebody is told to wait for intervals, which usually take a second or two.
+# How long pages say that intervals are about to come; they usually take a second or two.
 AWAITED_FOR = timedelta(minutes=5)
 
 
@@ -36,38 +36,38 @@ class BoardPosition:
 
 @dataclass(frozen=True)
 class SubmissionView:
-    """A submission, how far it is, and where it stands, if it does."""
+    """A submission with its progress and, if it is on the board, its position."""
 
     submission: Submission
     progress: Progress
-    place: BoardPosition | None
+    position: BoardPosition | None
     awaits_intervals: bool  # scored a moment ago, and they are about to come
 
     @property
     def intervals(self) -> Mapping[str, ConfidenceInterval]:
-        return published_intervals(self.progress, self.place)
+        return published_intervals(self.progress, self.position)
 
 
 def for_submissions(rows: Iterable[Submission], *, now: datetime) -> tuple[SubmissionView, ...]:
-    """What came of these submissions, best fetched with their evaluations, editions and scores."""
-    told = [(submission, progress_of(submission)) for submission in rows]
-    places = _places([each for each in told if _is_on_board(*each)])
+    """The views of these submissions, best fetched with their evaluations, editions and scores."""
+    pairs = [(submission, progress_of(submission)) for submission in rows]
+    positions = _positions([each for each in pairs if _is_on_board(*each)])
     return tuple(
         SubmissionView(
             submission=submission,
             progress=progress,
-            place=places.get(submission.pk),
+            position=positions.get(submission.pk),
             awaits_intervals=awaits_intervals(submission, progress, now=now),
         )
-        for submission, progress in told
+        for submission, progress in pairs
     )
 
 
 def board_position_of(submission: Submission, progress: Progress) -> BoardPosition | None:
-    """Where one submission is; None unless it stands in the published edition."""
-    return (
-        _places([(submission, progress)]).get(submission.pk) if _is_on_board(submission, progress) else None
-    )
+    """The position of one submission; None unless it is in the published edition."""
+    if not _is_on_board(submission, progress):
+        return None
+    return _positions([(submission, progress)]).get(submission.pk)
 
 
 def can_be_withdrawn(submission: Submission) -> bool:
@@ -81,7 +81,7 @@ def can_be_withdrawn(submission: Submission) -> bool:
 
 def has_intervals(progress: Progress) -> bool:
     """Whether any value has one."""
-    return any(found.low is not None for found in progress.intervals.values())
+    return any(interval.low is not None for interval in progress.intervals.values())
 
 
 def awaits_intervals(submission: Submission, progress: Progress, *, now: datetime) -> bool:
@@ -105,16 +105,18 @@ def why_no_intervals(submission: Submission, progress: Progress, *, now: datetim
     )
 
 
-def published_intervals(progress: Progress, place: BoardPosition | None) -> Mapping[str, ConfidenceInterval]:
+def published_intervals(
+    progress: Progress, position: BoardPosition | None
+) -> Mapping[str, ConfidenceInterval]:
     """The confidence intervals of the values, and rank ranges if it is a row of the present board."""
-    return place.intervals if place else _without_ranges(progress.intervals)
+    return position.intervals if position else _without_ranges(progress.intervals)
 
 
 def _without_ranges(intervals: Mapping[str, ConfidenceInterval]) -> dict[str, ConfidenceInterval]:
     return {
-        name: ConfidenceInterval(low=found.low, high=found.high)
-        for name, found in intervals.items()
-        if found.low is not None
+        name: ConfidenceInterval(low=interval.low, high=interval.high)
+        for name, interval in intervals.items()
+        if interval.low is not None
     }
 
 
@@ -125,30 +127,30 @@ def _is_on_board(submission: Submission, progress: Progress) -> bool:
     return progress.state == Status.SCORED and submission.withdrawn_at is None
 
 
-def _places(told: Sequence[tuple[Submission, Progress]]) -> dict[UUID, BoardPosition]:
-    if not told:
+def _positions(pairs: Sequence[tuple[Submission, Progress]]) -> dict[UUID, BoardPosition]:
+    if not pairs:
         return {}
-    wanted = {submission.split_id for submission, _ in told}
+    wanted = {submission.split_id for submission, _ in pairs}
     boards = {
         split.pk: (split.published_edition, drawn)
         for split, drawn in snapshots.shown_on([each for each in snapshots.splits() if each.pk in wanted])
         if split.published_edition is not None
     }
-    # In another edition than the present board's it stands nowhere.
-    told = [
+    # In another edition than the present board's it has no position.
+    pairs = [
         (submission, progress)
-        for submission, progress in told
+        for submission, progress in pairs
         if submission.split_id in boards and boards[submission.split_id][0].number == progress.edition_number
     ]
-    private = {s.method_id for s, _ in told if s.method.visibility == Visibility.PRIVATE}
+    private = {s.method_id for s, _ in pairs if s.method.visibility == Visibility.PRIVATE}
     best = _best_of(private, [edition for edition, _ in boards.values()]) if private else set()
     return {
-        submission.pk: _place(submission, progress, *boards[submission.split_id], best=best)
-        for submission, progress in told
+        submission.pk: _position(submission, progress, *boards[submission.split_id], best=best)
+        for submission, progress in pairs
     }
 
 
-def _place(
+def _position(
     submission: Submission, progress: Progress, edition: Edition, drawn: CurrentBoard, *, best: set[UUID]
 ) -> BoardPosition:
     n_ranked = sum(row.rank is not None for row in drawn.entries)
@@ -163,14 +165,14 @@ def _place(
             best=row.best,
             second=row.second,
         )
-    place = BoardPosition(
+    position = BoardPosition(
         edition=edition, rows=drawn.entries, n_ranked=n_ranked, intervals=_without_ranges(progress.intervals)
     )
     if submission.pk not in best:
-        return place
+        return position
     values = [row.scores[PRIMARY] for row in drawn.entries]
     rank = registry.rank([*values, (progress.scores or {}).get(PRIMARY)])[-1]
-    return replace(place, rank=rank, n_ranked=n_ranked + 1, is_supposed=True)
+    return replace(position, rank=rank, n_ranked=n_ranked + 1, is_supposed=True)
 
 
 def _best_of(methods: Iterable[UUID], editions: Iterable[Edition]) -> set[UUID]:
@@ -198,34 +200,36 @@ def _entry_in(editions: Iterable[Edition]) -> QuerySet[Score]:
 # --- what is beside it -----------------------------------------------------------------------------------
 
 
-def teams_best_other(submission: Submission, place: BoardPosition) -> Entry | None:
+def teams_best_other(submission: Submission, position: BoardPosition) -> Entry | None:
     """The team's best other entry on the same board, private ones included."""
-    others = _entry_in([place.edition]).filter(evaluation__submission__method__team=submission.method.team_id)
-    found = others.exclude(evaluation__submission=submission).values_list("evaluation", flat=True).first()
-    if found is None:
+    others = _entry_in([position.edition]).filter(
+        evaluation__submission__method__team=submission.method.team_id
+    )
+    best_pk = others.exclude(evaluation__submission=submission).values_list("evaluation", flat=True).first()
+    if best_pk is None:
         return None
     evaluation = (
         Evaluation.objects.select_related("submission__method__team", "edition")
         .prefetch_related("scores")
-        .get(pk=found)
+        .get(pk=best_pk)
     )
     entry = submitted_entry(
         evaluation,
         scored_of(evaluation),
         profile=profile_of(evaluation.submission.method),
-        decimals=place.edition.decimals,
+        decimals=position.edition.decimals,
     )
     # What has ranges is a row of the board.
-    rows = (row for row in place.rows if row.submission_id == entry.submission_id)
+    rows = (row for row in position.rows if row.submission_id == entry.submission_id)
     return replace(entry, intervals=next((row.intervals for row in rows), entry.intervals))
 
 
-def nearest_published(progress: Progress, place: BoardPosition) -> Entry | None:
+def nearest_published(progress: Progress, position: BoardPosition) -> Entry | None:
     """The row printed in a paper whose MiD is nearest; of two as near the better one."""
     mid = (progress.scores or {}).get(PRIMARY)
     near = [
         (abs(value - mid), value, row)
-        for row in place.rows
+        for row in position.rows
         if row.kind == "published" and mid is not None and (value := row.scores[PRIMARY]) is not None
     ]
     return min(near, key=lambda each: each[:2])[2] if near else None

@@ -49,14 +49,14 @@ def _scored(submission: Submission, edition_number: int | None) -> Evaluation:
     else:
         # An edition in preparation may still be given up: nothing of it is anybody's to quote.
         published = submission.evaluations.exclude(edition__published_at=None)
-        found = published.filter(edition__number=edition_number).first()
-        if found is None:
+        row = published.filter(edition__number=edition_number).first()
+        if row is None:
             raise Refused(
                 "edition-unknown",
                 f"The submission has no score in an edition {edition_number} of {submission.split_id}; "
                 "expected the number of an edition that was published.",
             )
-        evaluation = found
+        evaluation = row
     if evaluation.status != Status.SCORED or evaluation.edition.published_at is None:
         state = evaluation.get_status_display()
         raise Refused("not-scored", f"The submission is {state}; expected one that is scored.")

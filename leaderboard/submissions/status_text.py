@@ -6,7 +6,7 @@ from leaderboard.queue import lifecycle
 
 
 def sentence_of(evaluation: Evaluation) -> str:
-    """Whose fault it was, or what goes on, where that needs saying."""
+    """The cause of a failure or delay, or what happens now, in a sentence; else empty."""
     n_failed = evaluation.n_poison_strikes + evaluation.n_infrastructure_strikes
     match evaluation.status:
         case Status.REJECTED if evaluation.kept_in is not None:

@@ -1,1 +1,1 @@
-"""Upkeep: what workers do by themselves: look for work, sweep, send mails, clean, low-priority jobs."""
+"""Upkeep: the periodic tasks of workers: look for work, sweep, send mails, clean, low-priority jobs."""

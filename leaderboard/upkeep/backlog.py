@@ -26,7 +26,7 @@ FAULTS = (OSError, Rejected, child.ChildDied, child.ChildNotReady, child.LeaseLo
 
 
 class Stopping(Exception):
-    """The worker is to end; what was begun is begun anew by another."""
+    """The worker is to end; another worker begins the task again."""
 
 
 def work_off(*, now: datetime, rng: random.Random, is_stopping: Callable[[], bool] = lambda: False) -> int:
@@ -52,27 +52,27 @@ def _done(task: Callable[[], object], between: Callable[[], None]) -> bool:
 
 
 def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[], object]]:
-    held = truth_values.readable_digests()
-    for old, new in ground_truth.uncompared(held=held):
+    readable_truths = truth_values.readable_digests()
+    for old, new in ground_truth.uncompared(readable_truths=readable_truths):
         yield partial(ground_truth.count_changes, old, new)
-    asked = questions.waiting(held=held).select_related(
+    asked = questions.waiting(readable_truths=readable_truths).select_related(
         "edition__ground_truth", "edition__split", "first__submission__method", "second__submission__method"
     )
     begun: list[int] = []
-    # Asked anew each time: somebody may have come who waits for a pair, while others were only noted.
+    # Asked again each time: a user may wait for a pair by now, while others were only noted.
     while len(begun) < MAX_AT_ONCE and (row := asked.exclude(pk__in=begun).first()) is not None:
         begun.append(row.pk)
         yield partial(comparisons.compute, row, now=now)
     # Before entries are read: those of what waits are to be among them.
     between()
-    for entries in confidence.stale(now=now, held=held):
+    for entries in confidence.stale(now=now, readable_truths=readable_truths):
         yield partial(confidence.infer, entries, now=now, between=between)
-    for evaluation in analyses.missing(held=held)[:MAX_AT_ONCE]:
+    for evaluation in analyses.missing(readable_truths=readable_truths)[:MAX_AT_ONCE]:
         yield partial(analyses.make, evaluation, now=now)
 
 
 def _yield_to_live_work(*, rng: random.Random, is_stopping: Callable[[], bool]) -> None:
-    """Decide what waits before going on: somebody watches a page for it."""
+    """Decide waiting submissions first: their users watch a page for it."""
     while not is_stopping() and worker.run_next(rng=rng):
         pass
     if is_stopping():

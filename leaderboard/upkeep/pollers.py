@@ -41,13 +41,13 @@ def poll(*, rng: random.Random, stopping: threading.Event) -> int:
 
     Then what waits behind submissions. Returns how often one was decided.
     """
-    n_found = 0
+    n_decided = 0
     lifecycle.release_expired(rng=rng)
     while not stopping.is_set() and worker.run_next(rng=rng):
-        n_found += 1
+        n_decided += 1
     if not stopping.is_set():
         backlog.work_off(now=clock.database_now(), rng=rng, is_stopping=stopping.is_set)
-    return n_found
+    return n_decided
 
 
 def keep_up(*, rng: random.Random, stopping: threading.Event) -> None:
@@ -93,7 +93,7 @@ def sweep(*, rng: random.Random) -> None:
 
 
 def clean(*, now: datetime) -> None:
-    """Remove what nobody needs. Several may do it at once; each file is removed by one of them.
+    """Remove expired rows and orphaned files. Several workers may do it at once.
 
     Raises `OSError` if the store does not answer; what was removed until then stays removed.
     """
@@ -158,9 +158,9 @@ def start_pollers(*, rng: random.Random) -> Sequence[Poller]:
     return pollers
 
 
-def stop_pollers(pollers: Sequence[Poller], *, patience_s: float) -> None:
-    """Begin nothing more, and wait for what is in hand, but no longer than `patience_s`."""
-    ends_s = time.monotonic() + patience_s
+def stop_pollers(pollers: Sequence[Poller], *, timeout_s: float) -> None:
+    """Stop the pollers and wait for the task of each, at most `timeout_s` in all."""
+    ends_s = time.monotonic() + timeout_s
     for poller in pollers:
         poller.stop()
     for poller in pollers:

@@ -11,7 +11,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 View = TypeVar("View", bound=Callable[..., HttpResponseBase])
 
 asks_first = require_http_methods(["GET", "HEAD", "POST"])
-"""Of a view that shows a form and takes it."""
+"""Decorates a view that shows a form and accepts it."""
 
 
 def own_page(view: View) -> View:

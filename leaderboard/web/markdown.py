@@ -34,7 +34,7 @@ class TextHeading:
 
 @dataclass(frozen=True)
 class Part:
-    """What stands below one heading, as plain text, its blocks of code last: what a search looks through."""
+    """The plain text below one heading, its blocks of code last, for the search."""
 
     heading: TextHeading
     text: str
@@ -150,15 +150,15 @@ def _cell(token: Token) -> str:
 
 
 def _anchor(words: str, taken: set[str]) -> str:
-    """What links to a heading name, as most programs that draw Markdown make it.
+    """Return the anchor of a heading, as most programs that draw Markdown make it.
 
     >>> _anchor("Who sees a method?", set()), _anchor("`check`", {"check"})
     ('who-sees-a-method', 'check_1')
     """
     first = slugify(words) or "part"
-    found, n_before = first, 0
-    while found in taken:
+    anchor, n_before = first, 0
+    while anchor in taken:
         n_before += 1
-        found = f"{first}_{n_before}"
-    taken.add(found)
-    return found
+        anchor = f"{first}_{n_before}"
+    taken.add(anchor)
+    return anchor

@@ -27,7 +27,7 @@ FORWARDED = (
     "HTTP_X_REAL_IP",
 )
 
-# A second: whoever asks often costs no more than who asks once.
+# A second: frequent probes cost no more than one.
 KEPT_S = 1
 
 
@@ -42,20 +42,20 @@ def healthz(request: HttpRequest) -> HttpResponse:
 @require_safe
 def readyz(request: HttpRequest) -> HttpResponse:
     """The database answers, so this process can serve; for a balancer that sends visitors elsewhere."""
-    return _told(lambda: (health.database(),), well="ready")
+    return _probe_response(lambda: (health.database(),), well="ready")
 
 
 @never_cache
 @require_safe
 def healthy(request: HttpRequest) -> HttpResponse:
-    """Database, broker, sweep and what it found; 503 if one fails that somebody has to look after."""
-    return _told(health.checks, well="healthy")
+    """Database, broker, sweep and its findings; 503 if one fails that a person has to look after."""
+    return _probe_response(health.checks, well="healthy")
 
 
 @never_cache
 @require_safe
 def exposition(request: HttpRequest) -> HttpResponse:
-    """Figures, for whoever may read them."""
+    """Return Prometheus metrics to those who may read them."""
     if not may_read_metrics(request):
         return _sentence("Metrics are for the operator's monitoring.", status=403)
     try:
@@ -65,7 +65,7 @@ def exposition(request: HttpRequest) -> HttpResponse:
         return _sentence("The database does not answer.", status=503)
 
 
-def _told(ask: Callable[[], tuple[health.Check, ...]], *, well: str) -> JsonResponse:
+def _probe_response(ask: Callable[[], tuple[health.Check, ...]], *, well: str) -> JsonResponse:
     checks = caches["views"].get_or_set(f"probe:{well}", ask, KEPT_S) or ()
     is_well = all(check.is_ok for check in checks if check.is_vital)
     return JsonResponse(

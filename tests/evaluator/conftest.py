@@ -1,4 +1,4 @@
-"""What these tests share: the command itself, a server to speak to, and patience."""
+"""Fixtures of these tests: the command itself, a server to speak to, and fake time."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from tests.evaluator.fake_time import FakeTime
 
 
 @pytest.fixture(autouse=True)
-def places(own_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Settings of each test are its own, and there is no keyring, as on a machine for CI."""
+def settings_home(own_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Give each test its own settings and no keyring, as on a machine for CI."""
     home = own_folder / "home"
     monkeypatch.setenv("XDG_CONFIG_HOME", str(home / "config"))
     monkeypatch.setenv("PYTHON_KEYRING_BACKEND", "keyring.backends.fail.Keyring")

@@ -1,4 +1,4 @@
-"""Prediction files with one fault each, and of the problem that is to be told first code, words and place."""
+"""Prediction files with one fault each, and the code, words and pointer of the first problem of each."""
 
 import json
 import math

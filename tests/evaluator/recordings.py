@@ -48,7 +48,7 @@ def sign_flip_p(differences: Floats, *, rng: np.random.Generator, n_flips: int =
 
 def permutation_p(gaps: Floats, *, n_resamples: int) -> float:
     """The p of one column by scipy's test."""
-    found = stats.permutation_test(
+    test = stats.permutation_test(
         (gaps,),
         lambda x, axis: x.sum(axis=axis),
         permutation_type="samples",
@@ -56,4 +56,4 @@ def permutation_p(gaps: Floats, *, n_resamples: int) -> float:
         vectorized=True,
         rng=np.random.default_rng(0),
     )
-    return float(found.pvalue)
+    return float(test.pvalue)

@@ -43,8 +43,8 @@ def forms(path: Path) -> list[object]:
 def test_every_reader_takes_paths_bytes_and_open_files(truth: GroundTruth) -> None:
     expected = read_predictions(FILE.read_bytes(), manifest=truth.manifest)
     for source in forms(FILE):
-        found = read_predictions(source, manifest=truth.manifest)
-        assert (found.digest, found.ttc_s.tolist()) == (expected.digest, expected.ttc_s.tolist())
+        predictions = read_predictions(source, manifest=truth.manifest)
+        assert (predictions.digest, predictions.ttc_s.tolist()) == (expected.digest, expected.ttc_s.tolist())
     assert {read_truth(source).digest for source in forms(TABLE)} == {truth.digest}
     assert {read_manifest(source).digest for source in forms(TABLE)} == {truth.manifest.digest}
     assert {evaluator.convert(source, to="ttc") for source in forms(FILE)} == {evaluator.convert(FILE)}
@@ -83,8 +83,8 @@ def test_a_file_that_is_not_there_is_named(truth: GroundTruth, tmp_path: Path) -
     for read in (lambda path: read_predictions(path, manifest=truth.manifest), read_truth, read_manifest):
         with pytest.raises(Rejected) as caught:
             read(tmp_path / "mine.json")
-        found = str(caught.value.problems[0])
-        assert found == "mine.json: The file cannot be read: No such file or directory."
+        message = str(caught.value.problems[0])
+        assert message == "mine.json: The file cannot be read: No such file or directory."
 
 
 def test_arrays_may_be_scale_ratios(truth: GroundTruth) -> None:
@@ -92,8 +92,8 @@ def test_arrays_may_be_scale_ratios(truth: GroundTruth) -> None:
     data = evaluator.write_predictions(manifest=truth.manifest, scale_ratio=ratios, frame_gap=5)
     expected = read_predictions(data, manifest=truth.manifest).ttc_s
     for rate in ({"frame_gap": 5}, {"fps_hz": 2}):
-        found = Predictions.from_arrays(scale_ratio=ratios, manifest=truth.manifest, **rate)
-        assert (found.unit, found.ttc_s.tolist()) == ("scale_ratio", expected.tolist())
+        predictions = Predictions.from_arrays(scale_ratio=ratios, manifest=truth.manifest, **rate)
+        assert (predictions.unit, predictions.ttc_s.tolist()) == ("scale_ratio", expected.tolist())
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ SERIES = (
 )
 
 
-def test_a_series_in_another_order_is_not_taken_by_place(truth: GroundTruth) -> None:
+def test_a_series_in_another_order_is_not_taken_by_position(truth: GroundTruth) -> None:
     values = shuffled(truth)
     with pytest.raises(ValueError, match=SERIES):
         Predictions.from_arrays(ttc_s=values, manifest=truth.manifest)
@@ -137,15 +137,15 @@ def test_a_series_in_another_order_is_not_taken_by_place(truth: GroundTruth) -> 
     with pytest.raises(ValueError, match="scale_ratio is a Series with the index"):
         Predictions.from_arrays(scale_ratio=values, frame_gap=5, manifest=truth.manifest)
     for given in (values.sort_index(), values.to_numpy()[values.index.argsort()]):
-        found = Predictions.from_arrays(ttc_s=given, manifest=truth.manifest)
-        assert found.ttc_s.tolist() == truth.ttc_s.tolist()
+        predictions = Predictions.from_arrays(ttc_s=given, manifest=truth.manifest)
+        assert predictions.ttc_s.tolist() == truth.ttc_s.tolist()
 
 
 def test_a_series_may_be_indexed_by_the_manifest_s_own_anno_ids_alone() -> None:
     truth = make_truth([4.0, 5.0, 6.0], anno_ids=[2, 0, 1])
     own = pd.Series(truth.ttc_s, index=manifest_frame(truth.manifest).index)
-    found = Predictions.from_arrays(ttc_s=own, manifest=truth.manifest)
-    assert found.ttc_s.tolist() == [4.0, 5.0, 6.0]
+    predictions = Predictions.from_arrays(ttc_s=own, manifest=truth.manifest)
+    assert predictions.ttc_s.tolist() == [4.0, 5.0, 6.0]
     with pytest.raises(ValueError, match="with the index 0, 1, 2; expected 2, 0, 1"):
         Predictions.from_arrays(ttc_s=own.sort_index(), manifest=truth.manifest)
 
@@ -173,7 +173,7 @@ class FakeTensor:
 
 
 def tensor_kinds() -> list[object]:
-    """Makers of tensors, with torch those of torch too."""
+    """Makers of tensors, those of torch included where it is installed."""
     if find_spec("torch") is None:
         return [FakeTensor]
     import torch  # noqa: PLC0415 -- of an extra
@@ -188,8 +188,8 @@ def test_tensors_are_taken_in_bfloat16_and_with_a_gradient(tensor: Callable[[obj
     ttc_s = [1.0 / (2 * (1 / value - 1)) for value in values]
     for given in (tensor(values), [tensor(value) for value in values]):
         assert Predictions.from_arrays(ttc_s=given, manifest=manifest).ttc_s.tolist() == values
-        found = Predictions.from_arrays(scale_ratio=given, frame_gap=5, manifest=manifest)
-        assert found.ttc_s.tolist() == ttc_s
+        predictions = Predictions.from_arrays(scale_ratio=given, frame_gap=5, manifest=manifest)
+        assert predictions.ttc_s.tolist() == ttc_s
         assert evaluator.write_predictions(ttc_s=given, manifest=manifest) == b'{"0":0.5,"1":0.75}'
         assert evaluator.scale_ratio_to_ttc(given, fps_hz=2).tolist() == ttc_s
         assert evaluator.ttc_to_scale_ratio([4.0, 8.0], fps_hz=given).shape == (2,)
@@ -197,7 +197,7 @@ def test_tensors_are_taken_in_bfloat16_and_with_a_gradient(tensor: Callable[[obj
         assert MID.errors(given, given).shape == (2,)
 
 
-def test_a_dict_is_told_the_call_that_takes_one(truth: GroundTruth) -> None:
+def test_the_refusal_of_a_dict_names_the_call_that_takes_one(truth: GroundTruth) -> None:
     values = dict(zip(truth.manifest.anno_id_keys, truth.ttc_s.tolist(), strict=True))
     words = (
         r"ttc_s is of type dict; expected one number for each sequence, in the manifest's order\. For values "

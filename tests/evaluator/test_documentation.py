@@ -32,9 +32,9 @@ def test_the_page_shows_every_form() -> None:
 
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_every_example_is_accepted_and_says_about_the_same(example: str) -> None:
-    found = read_predictions(example.encode(), manifest=MANIFEST)
-    np.testing.assert_allclose(found.ttc_s, [5.31, -12.9, 0.84], rtol=2e-3)
-    assert found.meta == json.loads(example).get("meta")
+    predictions = read_predictions(example.encode(), manifest=MANIFEST)
+    np.testing.assert_allclose(predictions.ttc_s, [5.31, -12.9, 0.84], rtol=2e-3)
+    assert predictions.meta == json.loads(example).get("meta")
 
 
 def test_every_problem_has_its_line() -> None:

@@ -23,7 +23,7 @@ PAGE = (REPOSITORY / "docs" / "ci.md").read_text(encoding="utf-8")
 
 
 def printed(program: Path, folder: Path) -> list[str]:
-    """What a program prints, run elsewhere than in its folder; warnings are errors."""
+    """The lines that a program prints when run in another folder than its own; warnings are errors."""
     return subprocess.run(
         [sys.executable, "-W", "error", program],
         capture_output=True,
@@ -72,12 +72,12 @@ def test_better_model_is_better_by_more_than_chance(tmp_path: Path) -> None:
 
 def test_a_training_loop_gets_better_and_ends_with_a_file(tmp_path: Path) -> None:
     *epochs, worst, last = printed(EXAMPLES / "training_loop.py", tmp_path)
-    found = [float(line.partition("MiD ")[2].partition(",")[0]) for line in epochs]
-    assert found == sorted(found, reverse=True)
-    assert last.startswith(f"best MiD {found[-1]:.2f}; ")
+    mid_by_epoch = [float(line.partition("MiD ")[2].partition(",")[0]) for line in epochs]
+    assert mid_by_epoch == sorted(mid_by_epoch, reverse=True)
+    assert last.startswith(f"best MiD {mid_by_epoch[-1]:.2f}; ")
     name, _, mid = worst.removeprefix("worst recording ").partition(": MiD ")
     assert name in read_truth(EXAMPLES / "truth.csv").manifest.bag_stamp
-    assert float(mid.partition(" ")[0]) >= found[-1]
+    assert float(mid.partition(" ")[0]) >= mid_by_epoch[-1]
 
 
 def callback(monkeypatch: pytest.MonkeyPatch) -> Any:
@@ -89,7 +89,7 @@ def callback(monkeypatch: pytest.MonkeyPatch) -> Any:
 def test_the_lightning_callback_logs_the_scores_of_a_whole_epoch(monkeypatch: pytest.MonkeyPatch) -> None:
     scores, logged = callback(monkeypatch), dict[str, float]()
     trainer = SimpleNamespace(sanity_checking=False, world_size=1)
-    model = SimpleNamespace(log_dict=lambda found, **_: logged.update(found))
+    model = SimpleNamespace(log_dict=lambda values, **_: logged.update(values))
     scores.on_validation_epoch_start(trainer, model)
     for number, rows in enumerate(np.array_split(np.arange(60), 4)):
         assert logged == {}
@@ -101,8 +101,8 @@ def test_the_lightning_callback_logs_the_scores_of_a_whole_epoch(monkeypatch: py
             ):
                 scores.on_validation_epoch_end(trainer, model)
     scores.on_validation_epoch_end(trainer, model)
-    found = Predictions.from_arrays(ttc_s=1.1 * scores.truth.ttc_s, manifest=scores.truth.manifest)
-    assert logged == {f"tsttc/{name}": value for name, value in evaluate(found, scores.truth).flat().items()}
+    scaled = Predictions.from_arrays(ttc_s=1.1 * scores.truth.ttc_s, manifest=scores.truth.manifest)
+    assert logged == {f"tsttc/{name}": value for name, value in evaluate(scaled, scores.truth).flat().items()}
     assert len(scores.report.breakdown("recording")) == 6
 
 

@@ -59,7 +59,7 @@ for name, action in (("mem", mem), ("process_vm_readv", vm_readv),
 
 
 def reached_by_another(how: str) -> set[str]:
-    """What a second process reads of a first of the same user."""
+    """Names of what a second process of the same user can read of a first one."""
     environment = {"PATH": os.defpath, "PYTHONPATH": os.environ.get("PYTHONPATH", ""), "SECRET": "secret"}
     with subprocess.Popen(
         [sys.executable, "-c", VICTIM, how],

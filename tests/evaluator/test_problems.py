@@ -74,7 +74,7 @@ def test_kinds_are_listed_apart() -> None:
     ]
 
 
-def test_equal_problems_share_a_line_that_names_their_places() -> None:
+def test_equal_problems_share_a_line_that_names_their_pointers() -> None:
     findings = Findings()
     findings.add("zero", "0", "/a")
     for row in range(28_600):
@@ -84,8 +84,8 @@ def test_equal_problems_share_a_line_that_names_their_places() -> None:
         findings.raise_if_any()
     zero, null = rejected.value.problems
     assert (zero.where, zero.message) == ("/a", "0 1 more place has this problem: /b.")
-    places = ", ".join(f"/{row}" for row in range(1, 21))
-    more = f"28,599 more places have this problem: {places}, … (the first 20)."
+    pointers = ", ".join(f"/{row}" for row in range(1, 21))
+    more = f"28,599 more places have this problem: {pointers}, … (the first 20)."
     assert (null.where, null.message) == ("/0", f"The value is null. {more}")
     assert rejected.value.n_problems == 28_602
     assert str(rejected.value).startswith("28,602 problems; equal ones share a line:\n")

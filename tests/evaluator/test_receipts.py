@@ -1,4 +1,4 @@
-"""Score receipts: whole and unchanged they verify, and in no other way."""
+"""Score receipts verify when they are whole and unchanged, and only then."""
 
 import base64
 import json
@@ -76,7 +76,7 @@ def test_signing_again_gives_the_same_bytes() -> None:
     assert list(KEYS) == ["1IG2tMH7J2wbJZnOf8LJzQitKf7LMvoAElsuDMVM54Y"]
 
 
-def test_whoever_knows_the_standard_alone_verifies_a_receipt_with_the_published_key() -> None:
+def test_the_standard_alone_verifies_a_receipt_with_the_published_key() -> None:
     [key] = receipts.key_set([receipts.public_key(SEED)])["keys"]
     signed, _, signature = RECEIPT.rpartition(b".")
     public = Ed25519PublicKey.from_public_bytes(base64.urlsafe_b64decode(key["x"] + "="))
@@ -125,7 +125,7 @@ def test_what_the_site_signed_for_another_purpose_is_no_receipt() -> None:
     assert code_of(token({"version": 2, **fields(scores=7)})) == "receipt-malformed"
 
 
-def test_newer_version_is_told_apart_from_a_forged_one() -> None:
+def test_newer_version_is_distinguished_from_a_forged_one() -> None:
     assert code_of(token({**fields(), "version": 3})) == "receipt-version"
 
 

@@ -42,41 +42,41 @@ needs_a_filter = pytest.mark.skipif(
 
 
 def verdict(program: bytes, *, architecture: int, number: int) -> int:
-    """What the kernel's machine makes of the filter for this call."""
+    """Run the filter for this call as the kernel does."""
     call = struct.pack("=iIQ", number, architecture, 0)
     instructions = [struct.unpack_from("=HBBI", program, at) for at in range(0, len(program), 8)]
-    word = place = 0
+    word = position = 0
     while True:
-        operation, if_equal, if_not, operand = instructions[place]
-        place += 1
+        operation, if_equal, if_not, operand = instructions[position]
+        position += 1
         if operation == 0x20:
             [word] = struct.unpack_from("=I", call, operand)
         elif operation == 0x15:
-            place += if_equal if word == operand else if_not
+            position += if_equal if word == operand else if_not
         else:
             assert operation == 0x06
             return int(operand)
 
 
-@pytest.mark.parametrize(("place", "machine"), list(enumerate(ARCHITECTURES)))
-def test_filter_allows_what_it_names_and_refuses_every_other_number(place: int, machine: str) -> None:
+@pytest.mark.parametrize(("column", "machine"), list(enumerate(ARCHITECTURES)))
+def test_filter_allows_what_it_names_and_refuses_every_other_number(column: int, machine: str) -> None:
     program = program_for(machine)
     architecture = ARCHITECTURES[machine]
-    allowed = {numbers[place] for numbers in ALLOWED.values()}
+    allowed = {numbers[column] for numbers in ALLOWED.values()}
     # 1 << 30 is the bit of the calls of x32.
     for number in (*range(600), *(number | 1 << 30 for number in range(600)), -1):
         expected = ALLOW if number in allowed else REFUSE
         assert verdict(program, architecture=architecture, number=number) == expected, number
 
 
-@pytest.mark.parametrize(("place", "machine"), list(enumerate(ARCHITECTURES)))
-def test_what_reaches_another_file_or_process_is_refused_by_name(place: int, machine: str) -> None:
+@pytest.mark.parametrize(("column", "machine"), list(enumerate(ARCHITECTURES)))
+def test_what_reaches_another_file_or_process_is_refused_by_name(column: int, machine: str) -> None:
     program = program_for(machine)
     for name, numbers in DANGEROUS.items():
-        number = numbers[place]
+        number = numbers[column]
         if number is not None:
-            found = verdict(program, architecture=ARCHITECTURES[machine], number=number)
-            assert found == REFUSE, name
+            action = verdict(program, architecture=ARCHITECTURES[machine], number=number)
+            assert action == REFUSE, name
 
 
 @pytest.mark.parametrize("machine", ARCHITECTURES)

@@ -60,10 +60,10 @@ def truth_of(n_days: int, *, per_day: int = 3) -> GroundTruth:
 @pytest.mark.parametrize("form", FORMS)
 def test_from_30_days_on_the_day_is_the_unit_and_with_29_the_recording(form: str) -> None:
     assert str(units_of(names(29, form=form), given={})) == "87 recordings"
-    found = units_of(names(30, form=form), given={})
-    assert str(found) == "30 days"
-    assert found.index == tuple(i // 3 for i in range(90))
-    assert found.names[0] == "2023-03-14"
+    units = units_of(names(30, form=form), given={})
+    assert str(units) == "30 days"
+    assert units.index == tuple(i // 3 for i in range(90))
+    assert units.names[0] == "2023-03-14"
 
 
 @pytest.mark.parametrize(
@@ -109,8 +109,8 @@ def test_units_are_a_part_of_both_digests_and_survive_every_form(tmp_path: Path)
         read_manifest(io.BytesIO(truth.manifest.to_csv())),
         read_manifest(io.BytesIO(truth.to_csv())),
     ]
-    for found in again:
-        assert (found.digest, found.units) == (truth.manifest.digest, truth.manifest.units)
+    for manifest in again:
+        assert (manifest.digest, manifest.units) == (truth.manifest.digest, truth.manifest.units)
 
 
 def test_a_recording_in_two_units_is_refused_with_the_row() -> None:
@@ -153,8 +153,8 @@ def test_intervals_and_comparisons_follow_the_rule_and_another_unit_can_be_asked
     low, high = bootstrap_of(truth.digest, bags.counts).intervals(bags.sums[None])
     by_recording = confidence_intervals(mine, truth, unit=RECORDING)
     assert by_recording["mid"] == (low[0, 0], high[0, 0]) != by_day["mid"]
-    found = compare_predictions(mine, theirs, truth)["mid"]
-    assert (found.unit, found.n_effective) == (DAY, 32.0)
+    difference = compare_predictions(mine, theirs, truth)["mid"]
+    assert (difference.unit, difference.n_effective) == (DAY, 32.0)
     assert compare_predictions(mine, theirs, truth, unit=RECORDING)["mid"].n_effective == 96.0
 
 
@@ -164,8 +164,8 @@ def test_with_seven_units_there_is_no_interval_however_many_recordings_there_are
     truth = GroundTruth.from_table(table(recordings, unit=unit))
     mine, theirs = predictions(truth, 1), predictions(truth, 2)
     assert set(confidence_intervals(mine, truth).values()) == {None}
-    found = compare_predictions(mine, theirs, truth)["mid"]
-    assert (found.low, found.p, found.unit) == (None, None, GIVEN)
+    difference = compare_predictions(mine, theirs, truth)["mid"]
+    assert (difference.low, difference.p, difference.unit) == (None, None, GIVEN)
     assert confidence_intervals(mine, truth, unit=DAY)["mid"] is not None
 
 
@@ -204,7 +204,7 @@ def test_compare_says_over_which_units_it_tests(tsttc: Tsttc, folder: Path) -> N
     document = json.loads(tsttc(*compare, "--json").stdout)
     assert (document["unit"], document["n_units"]) == ("day", 32)
     assert document["differences"]["mid"]["n_effective"] == 32
-    said = tsttc(*compare, "--unit", "recording").stdout
-    assert "95 % confidence intervals and p-values over 96 recordings\n" in said
+    text = tsttc(*compare, "--unit", "recording").stdout
+    assert "95 % confidence intervals and p-values over 96 recordings\n" in text
     board = tsttc("compare", "A", "B", "--unit", "day")
     assert (board.exit_code, "--unit needs --truth" in board.stderr) == (2, True)

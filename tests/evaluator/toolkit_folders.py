@@ -151,20 +151,20 @@ def list_backwards(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def toolkit_results(folder: Path, *, error: float = 1.02) -> dict[str, tuple[str, float]]:
-    """By the toolkit's anno_id the natural key and a prediction, from a plain loop like the toolkit's."""
-    found: dict[str, tuple[str, float]] = {}
+    """Natural key and prediction by the toolkit's anno_id, from a plain loop like the toolkit's."""
+    predictions: dict[str, tuple[str, float]] = {}
     for directory, _, names in os.walk(folder):
         for name in names:
             for frames in pickle.loads(Path(directory, name).read_bytes()):
-                held: dict[Any, list[Any]] = {}
+                sequences: dict[Any, list[Any]] = {}
                 for _stamp, objects in sorted(frames.items()):
                     for one in objects:
-                        before = held.get(one["id"], [])
+                        before = sequences.get(one["id"], [])
                         is_next = bool(before) and one["ts"] - before[-1]["ts"] == STEP_NS
-                        held[one["id"]] = [*before, one] if is_next else [one]
-                    for track in [key for key, sequence in held.items() if len(sequence) == 6]:
-                        last = held.pop(track)[-1]
+                        sequences[one["id"]] = [*before, one] if is_next else [one]
+                    for track in [key for key, sequence in sequences.items() if len(sequence) == 6]:
+                        last = sequences.pop(track)[-1]
                         bag = last["bag_stamp"].rsplit("/", 1)[-1]
                         key = f"{bag}/{last['cam_id']}/{last['ts']}/{last['id']}"
-                        found[str(len(found))] = (key, error * float(last["ttc_imu"]))
-    return found
+                        predictions[str(len(predictions))] = (key, error * float(last["ttc_imu"]))
+    return predictions

@@ -24,16 +24,16 @@ Tsttc = Callable[..., Result]
 
 
 def screen_text(terminal: int) -> str:
-    """All that was written to a pseudo terminal whose other ends are closed; closes this one as well."""
+    """Read all that was written to a pseudo terminal whose other ends are closed, and close this end."""
     shown = b""
-    with os.fdopen(terminal, "rb", buffering=0) as screen, suppress(OSError):  # that is how its end is told
+    with os.fdopen(terminal, "rb", buffering=0) as screen, suppress(OSError):  # raised at its end
         while piece := screen.read(1 << 16):
             shown += piece
     return shown.decode()
 
 
 def process(*arguments: object, **options: Any) -> "subprocess.CompletedProcess[str]":
-    """What the command does as a process of its own; it has the recorded site's address from the test's."""
+    """Run the command as a process of its own; it inherits the recorded site's address from the test."""
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
     command = [sys.executable, "-m", "evaluator", *map(str, arguments)]
     done: subprocess.CompletedProcess[str] = subprocess.run(
@@ -45,7 +45,7 @@ def process(*arguments: object, **options: Any) -> "subprocess.CompletedProcess[
 def on_terminal(
     *arguments: object, stream: str = "stderr", **environment: str
 ) -> "tuple[subprocess.CompletedProcess[str], str]":
-    """The same with one of its streams led to a terminal, and what that shows."""
+    """Run the command with one of its streams on a terminal; give the text of the terminal too."""
     terminal, end = os.openpty()
     options: dict[str, Any] = {"stdin": subprocess.DEVNULL, stream: end}
     done = process(*arguments, **options, env=os.environ | {"TERM": "xterm"} | environment)

@@ -46,13 +46,13 @@ kept.MAKERS["entries"] = lambda folder: _make_four(make_edition(folder), make_ow
 
 @pytest.fixture
 def owner(db: None) -> User:
-    """Somebody who submits."""
+    """A user who submits."""
     return User.objects.get(email="owner@example.org") if kept.has_people() else make_owner()
 
 
 @pytest.fixture
 def teammate(owner: User) -> User:
-    """Somebody in the owner's team."""
+    """A user in the owner's team."""
     user = User.objects.create_user("teammate@example.org", "correct horse", name="Mate")
     Membership.objects.create(team=teams.team_of(user=owner), user=user)
     return user
@@ -66,13 +66,13 @@ def team(owner: User, teammate: User) -> Team:
 
 @pytest.fixture
 def stranger(db: None) -> User:
-    """Somebody else, in a team of their own."""
+    """Another user, in a team of their own."""
     return User.objects.create_user("stranger@example.org", "correct horse", name="Strangers")
 
 
 @pytest.fixture
 def maintainer(db: None) -> User:
-    """Somebody who looks after the benchmark."""
+    """A user who maintains the benchmark."""
     return User.objects.create_superuser("maintainer@example.org", "correct horse", name="Keepers")
 
 
@@ -101,7 +101,7 @@ def lease(edition: Edition, owner: User) -> Lease:
 
 @pytest.fixture
 def open_values(benchmark: None) -> None:
-    """The values of the test split are open: intervals and p are told of all pairs, and exactly."""
+    """Open the values of the test split, so all pairs have exact intervals and p."""
     Split.objects.filter(pk="test").update(is_hidden=False)
 
 
@@ -115,7 +115,7 @@ def entries(edition: Edition, owner: User) -> list[Submission]:
 
 @pytest.fixture
 def second(entries: list[Submission], tmp_path: Path) -> Edition:
-    """An edition in preparation beside the board, with everything of it waiting."""
+    """An edition in preparation, with all of its evaluations waiting."""
     return open_edition(corrected(tmp_path, factor=1.3))
 
 

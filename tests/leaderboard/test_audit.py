@@ -67,11 +67,11 @@ def test_events_written_together_are_sealed_in_their_order(db: None) -> None:
     sealed()
     in_order = AuditEvent.objects.order_by("seal_number").values_list("noun_id", flat=True)
     assert list(in_order[1:501]) == [str(number) for number in range(500)]
-    found = audit.verify()
-    assert (found.n_events, found.breaks, found.unsealed.n_events) == (502, (), 0)
+    verification = audit.verify()
+    assert (verification.n_events, verification.breaks, verification.unsealed.n_events) == (502, (), 0)
 
 
-def test_an_event_that_is_committed_late_is_sealed_when_it_is_found(db: None) -> None:
+def test_an_event_that_is_committed_late_is_sealed_after_the_others(db: None) -> None:
     """By then events with greater ids and later moments are sealed, and it follows them."""
     sealed(3)
     late = AuditEvent.objects.create(
@@ -110,7 +110,7 @@ def test_details_that_databases_give_back_differently_are_refused(db: None, valu
     assert not AuditEvent.objects.exists()
 
 
-def test_what_a_run_found_is_bound_by_the_digest_of_its_report(edition: Edition, owner: User) -> None:
+def test_the_outcome_of_a_run_is_bound_by_the_digest_of_its_report(edition: Edition, owner: User) -> None:
     builders.submit(owner, builders.predictions(edition))
     builders.score_all()
     row = Evaluation.objects.get()
@@ -210,8 +210,8 @@ def test_a_changed_event_is_named(owner: User, column: str, value: str | None) -
     sealed(3, actor=owner)
     second = AuditEvent.objects.order_by("pk")[1]
     in_sql(f"UPDATE leaderboard_auditevent SET {column} = %s WHERE id = %s", value, second.pk)
-    [found] = audit.verify().breaks
-    assert (found.event_id, found.what) == (second.pk, "says something else than when it was written")
+    [fault] = audit.verify().breaks
+    assert (fault.event_id, fault.what) == (second.pk, "says something else than when it was written")
 
 
 @SQLITE_ONLY
@@ -232,8 +232,8 @@ def test_an_event_whose_seal_was_taken_off_is_missed_also_once_it_is_sealed_agai
     unsealed = "verb = 'other', seal_number = NULL, previous_hash = NULL, hash = NULL"
     in_sql(f"UPDATE leaderboard_auditevent SET {unsealed} WHERE id = %s", second)
     audit.seal()
-    [found] = audit.verify().breaks
-    assert found.event_id == second + 1
+    [fault] = audit.verify().breaks
+    assert fault.event_id == second + 1
 
 
 @SQLITE_ONLY
@@ -249,7 +249,7 @@ def test_an_end_that_was_cut_off_is_missed_by_who_noted_the_last_hash(db: None) 
 # --- looking for events ----------------------------------------------------------------------------------
 
 
-def test_events_are_found_by_actor_verb_noun_and_time(owner: User, stranger: User) -> None:
+def test_events_are_filtered_by_actor_verb_noun_and_time(owner: User, stranger: User) -> None:
     record(2, actor=owner)
     record(actor=stranger, verb="opened", noun="Window", noun_id="abc-1")
     assert [e.actor for e in audit.events(actor="OWNER@")] == [owner, owner]

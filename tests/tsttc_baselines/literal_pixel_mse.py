@@ -22,8 +22,8 @@ def cut_and_resize(window: patches.Window, box: Floats, *, columns: int, rows: i
         ((x - window.origin[0]) / window.pixel_size[0] - 0.5).astype(np.float32),
         ((y - window.origin[1]) / window.pixel_size[1] - 0.5).astype(np.float32),
     )
-    found = cv2.remap(window.pixels, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(found, dtype=np.float32)
+    resampled = cv2.remap(window.pixels, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(resampled, dtype=np.float32)
 
 
 def mean_square(differences: NDArray[np.float32]) -> float:

@@ -1,4 +1,4 @@
-"""Ablations: the own scores of each setting, beside what the paper prints."""
+"""Ablations: the own scores of each setting, next to what the paper prints."""
 
 from pathlib import Path
 

@@ -19,7 +19,7 @@ def alpha(clip: Clip, frame_gap: int = TARGET) -> float:
 
 
 @pytest.mark.parametrize("scale_ratio", [0.68, 0.8, 0.9, 0.97, 1.0, 1.06, 1.2, 1.45])
-def test_a_planted_scale_ratio_is_found(scale_ratio: float) -> None:
+def test_a_planted_scale_ratio_is_recovered(scale_ratio: float) -> None:
     assert alpha(planted(scale_ratio)) == pytest.approx(scale_ratio, abs=1e-3)
 
 

@@ -9,10 +9,10 @@ from tsttc_baselines import boxes
 
 IMAGE = {"width_px": 1024.0, "height_px": 576.0}
 sides = st.floats(4, 300)
-places = st.floats(0, 500)
+coordinates = st.floats(0, 500)
 
 
-@given(x=places, y=places, width=sides, height=sides, ratio=st.floats(0.5, 2))
+@given(x=coordinates, y=coordinates, width=sides, height=sides, ratio=st.floats(0.5, 2))
 def test_expansion_keeps_the_centre_and_multiplies_both_sides(
     x: float, y: float, width: float, height: float, ratio: float
 ) -> None:
@@ -22,7 +22,7 @@ def test_expansion_keeps_the_centre_and_multiplies_both_sides(
     np.testing.assert_allclose(boxes.size_of(grown), boxes.size_of(box) * ratio)
 
 
-@given(x=places, y=places, width=sides, height=sides)
+@given(x=coordinates, y=coordinates, width=sides, height=sides)
 def test_the_shared_expansion_keeps_both_boxes_within_the_image(
     x: float, y: float, width: float, height: float
 ) -> None:
@@ -48,6 +48,6 @@ def test_the_narrower_of_two_rooms_decides() -> None:
 def test_every_measure_but_the_area_gives_the_scale_of_the_box(scale: float) -> None:
     target = np.array([100.0, 100, 180, 160])
     reference = boxes.expand(target, scale)
-    found = {m: float(boxes.scale_ratio_of_boxes(reference, target, measure=m)) for m in boxes.MEASURES}
-    assert found.pop("area") == pytest.approx(scale**2)
-    assert list(found.values()) == pytest.approx([scale] * 3)
+    ratios = {m: float(boxes.scale_ratio_of_boxes(reference, target, measure=m)) for m in boxes.MEASURES}
+    assert ratios.pop("area") == pytest.approx(scale**2)
+    assert list(ratios.values()) == pytest.approx([scale] * 3)

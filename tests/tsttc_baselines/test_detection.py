@@ -28,8 +28,8 @@ def clip(reference: list[float], target: list[float]) -> Clip:
 def test_each_measure_is_the_size_of_the_reference_over_that_of_the_target(
     measure: Measure, ratio: float
 ) -> None:
-    found = Detection(measure=measure)(clip([10, 10, 30, 20], [5, 5, 45, 45]), frame_gap=5)
-    assert found.scale_ratio == pytest.approx(ratio, rel=1e-15)
+    estimate = Detection(measure=measure)(clip([10, 10, 30, 20], [5, 5, 45, 45]), frame_gap=5)
+    assert estimate.scale_ratio == pytest.approx(ratio, rel=1e-15)
 
 
 @pytest.mark.parametrize("box", [[1, 1, 1, 9], [9, 1, 1, 9], [1, 9, 9, 1], [np.nan] * 4, [1, 1, np.inf, 9]])
@@ -60,8 +60,8 @@ def test_real_drives_give_the_means_of_the_toolkit(
         frame_gap=5,
         out=tmp_path / "p.json",
     )
-    found = read_predictions((tmp_path / "p.json").read_bytes(), manifest=truth.manifest)
-    scores = evaluate(found, truth, protocol=protocol).scores
+    predictions = read_predictions((tmp_path / "p.json").read_bytes(), manifest=truth.manifest)
+    scores = evaluate(predictions, truth, protocol=protocol).scores
     for range_name, expected in json.loads((kitti / "expected.json").read_text())[name].items():
         assert scores[range_name].count == expected["count"]
         assert scores[range_name].mid == pytest.approx(expected["mid"], rel=1e-9)

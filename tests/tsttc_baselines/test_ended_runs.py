@@ -1,6 +1,6 @@
 """A run that is ended from outside leaves no process behind, and the same command continues it.
 
-An image that is a named pipe holds a process at a known place: it opens for writing when a process reads it.
+An image that is a named pipe stops a process at a known step: it opens for writing when a process reads it.
 """
 
 import json
@@ -32,7 +32,7 @@ MOST_S = 180
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Twenty sequences, of which one never ends."""
+    """Twenty sequences; one of them never ends."""
     (tmp_path / "in").mkdir()
     folder = made_folder(tmp_path / "in", n=N)
     pipe = image_path(folder, 12, 0)
@@ -42,8 +42,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 @contextmanager
-def held_run(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", int]]:
-    """A run in a process group of its own that waits for the image, and the writing end of that."""
+def waiting_run(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", int]]:
+    """Start a run in its own process group that waits for the image; give it and the image's writing end."""
     out = folder.parent / "p.json"
     words = ["baseline", "run", "pixel-mse", str(folder), "--out", str(out), "--jobs", "2"]
     with default_signals():
@@ -70,7 +70,7 @@ def held_run(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", int]]:
 
 
 def nobody_reads(end: int) -> bool:
-    """Waits until no process has the image open."""
+    """Wait until no process has the image open."""
     poll = select.poll()
     poll.register(end, select.POLLERR)
     return bool(poll.poll(1000 * MOST_S))
@@ -85,12 +85,12 @@ def predictions_of(tsttc: Tsttc, folder: Path, name: str) -> dict[str, float]:
     out = folder.parent / name
     result = tsttc("baseline", "run", "pixel-mse", folder, "--out", out, "--jobs", 1)
     assert result.exit_code == 0, result.stderr
-    found: dict[str, float] = json.loads(out.read_text())["predictions"]
-    return found
+    predictions: dict[str, float] = json.loads(out.read_text())["predictions"]
+    return predictions
 
 
 def test_a_killed_run_leaves_no_process_and_continues(folder: Path, tsttc: Tsttc) -> None:
-    with held_run(folder) as (process, end):
+    with waiting_run(folder) as (process, end):
         process.kill()
         assert nobody_reads(end)
     assert not (folder.parent / "p.json").exists()
@@ -101,7 +101,7 @@ def test_a_killed_run_leaves_no_process_and_continues(folder: Path, tsttc: Tsttc
 
 
 def test_ctrl_c_ends_a_run_at_once_and_in_words(folder: Path) -> None:
-    with held_run(folder) as (process, end):
+    with waiting_run(folder) as (process, end):
         os.killpg(process.pid, signal.SIGINT)
         assert nobody_reads(end)
         _, complaints = process.communicate(timeout=MOST_S)
@@ -111,8 +111,8 @@ def test_ctrl_c_ends_a_run_at_once_and_in_words(folder: Path) -> None:
     assert (folder.parent / "p.json.part").exists()
 
 
-def test_a_process_that_dies_is_told_in_words(folder: Path) -> None:
-    with held_run(folder) as (process, end):
+def test_a_process_that_dies_is_reported_in_words(folder: Path) -> None:
+    with waiting_run(folder) as (process, end):
         for child in children_of(process.pid):
             if "spawn_main" in kernel_says(child, "cmdline"):
                 os.kill(child, signal.SIGKILL)

@@ -28,7 +28,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def refusal(folder: Path, *, frame_gap: int = 5) -> tuple[str, str, str]:
-    """Code, place and message of the one problem of a folder."""
+    """Code, pointer and message of the one problem of a folder."""
     with pytest.raises(Rejected) as rejected:
         require_usable(read_folder(folder), method=GREY_LEVELS, frame_gap=frame_gap)
     [problem] = rejected.value.problems
@@ -37,9 +37,9 @@ def refusal(folder: Path, *, frame_gap: int = 5) -> tuple[str, str, str]:
 
 @pytest.mark.parametrize("extension", ["jpg", "png"])
 def test_frames_and_boxes_of_a_folder_are_those_of_its_files(tmp_path: Path, extension: str) -> None:
-    found = read_folder(made_folder(tmp_path, extension=extension))
-    clip = found.clip(1, cache=ImageCache())
-    assert found.manifest.anno_id.tolist() == [0, 1, 2]
+    frame_folder = read_folder(made_folder(tmp_path, extension=extension))
+    clip = frame_folder.clip(1, cache=ImageCache())
+    assert frame_folder.manifest.anno_id.tolist() == [0, 1, 2]
     np.testing.assert_array_equal(clip.boxes, [box(frame) for frame in range(6)])
     assert clip.grey(0).shape == (96, 160)
     for frame in range(6):
@@ -77,7 +77,7 @@ HEAD = "anno_id,frame,x1,y1,x2,y2\n"
 
 
 @pytest.mark.parametrize(
-    ("spoil", "code", "place", "words"),
+    ("spoil", "code", "where", "words"),
     [
         (without("manifest.csv"), "unreadable", "", "has a boxes.csv and no manifest.csv; expected"),
         (without("boxes.csv"), "unreadable", "", "has no boxes.csv and no annotation files; exp"),
@@ -144,18 +144,18 @@ HEAD = "anno_id,frame,x1,y1,x2,y2\n"
         ),
     ],
 )  # fmt: skip
-def test_a_table_at_fault_is_refused_with_place_found_and_expected(
-    folder: Path, spoil: Callable[[Path], object], code: str, place: str, words: str
+def test_a_table_at_fault_is_refused_with_position_content_and_expectation(
+    folder: Path, spoil: Callable[[Path], object], code: str, where: str, words: str
 ) -> None:
     spoil(folder)
-    found = refusal(folder)
-    assert found[:2] == (code, place or folder.name)
-    assert words in found[2]
+    problem = refusal(folder)
+    assert problem[:2] == (code, where or folder.name)
+    assert words in problem[2]
 
 
 def test_a_folder_of_neither_kind_is_refused(tmp_path: Path) -> None:
-    code, place, message = refusal(tmp_path)
-    assert (code, place) == ("unreadable", tmp_path.name)
+    code, where, message = refusal(tmp_path)
+    assert (code, where) == ("unreadable", tmp_path.name)
     assert message == (
         "The folder has neither manifest.csv with boxes.csv nor annotation files; "
         "expected manifest.csv and boxes.csv, or the dataset's annotation files (*.pkl)."
@@ -165,9 +165,9 @@ def test_a_folder_of_neither_kind_is_refused(tmp_path: Path) -> None:
 def test_a_folder_without_any_image_is_refused_unless_no_image_is_looked_at(tmp_path: Path) -> None:
     write_manifest(tmp_path)
     write_boxes(tmp_path)
-    code, place, message = refusal(tmp_path)
+    code, where, message = refusal(tmp_path)
     path = image_path(tmp_path, 0, 5).relative_to(tmp_path / "images")
-    assert (code, place) == ("bad-frame", path.as_posix())
+    assert (code, where) == ("bad-frame", path.as_posix())
     assert message.startswith("No sequence has an image of its target frame; expected the first one here")
     require_usable(read_folder(tmp_path), method=get_method("detection"), frame_gap=5)
 

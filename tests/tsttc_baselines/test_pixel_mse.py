@@ -16,7 +16,7 @@ RATIOS = (0.72, 0.85, 0.97, 1.0, 1.08, 1.3)
 
 @pytest.mark.parametrize("search", SEARCHES)
 @pytest.mark.parametrize("scale_ratio", RATIOS)
-def test_a_planted_scale_ratio_is_found_within_half_a_bin(scale_ratio: float, search: str) -> None:
+def test_a_planted_scale_ratio_is_recovered_within_half_a_bin(scale_ratio: float, search: str) -> None:
     estimate = PixelMse(search=search)(planted(3, scale_ratio=scale_ratio), frame_gap=5)
     assert estimate.scale_ratio == pytest.approx(scale_ratio, abs=BIN / 2)
     assert estimate.confidence > 0.9
@@ -26,8 +26,8 @@ def test_a_planted_scale_ratio_is_found_within_half_a_bin(scale_ratio: float, se
 def test_every_frame_gap_finds_a_ratio_of_its_range(frame_gap: int) -> None:
     low, high = SCALE_RANGES[frame_gap]
     planted_ratio = low + 0.3 * (high - low)
-    found = PixelMse()(planted(4, scale_ratio=planted_ratio), frame_gap=frame_gap)
-    assert found.scale_ratio == pytest.approx(planted_ratio, abs=BIN / 2)
+    estimate = PixelMse()(planted(4, scale_ratio=planted_ratio), frame_gap=frame_gap)
+    assert estimate.scale_ratio == pytest.approx(planted_ratio, abs=BIN / 2)
 
 
 @pytest.mark.parametrize("scale_ratio", RATIOS)

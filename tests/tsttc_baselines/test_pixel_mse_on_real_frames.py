@@ -42,9 +42,9 @@ def with_loose_boxes(real: Real) -> Real:
 
 @pytest.mark.parametrize("search", SEARCHES)
 def test_the_papers_variant_reaches_its_errors_on_real_frames(real_clips: Real, search: str) -> None:
-    found = ratios(real_clips[0], PixelMse(search=search))
-    assert mean_mid(found, real_clips[1]) <= 20
-    assert np.mean(RTE.errors(scale_ratio_to_ttc(found, fps_hz=fps_of_gap(5)), real_clips[1])) <= 21
+    estimates = ratios(real_clips[0], PixelMse(search=search))
+    assert mean_mid(estimates, real_clips[1]) <= 20
+    assert np.mean(RTE.errors(scale_ratio_to_ttc(estimates, fps_hz=fps_of_gap(5)), real_clips[1])) <= 21
 
 
 def test_the_toolkits_variant_is_worse_as_it_should_be(real_clips: Real) -> None:

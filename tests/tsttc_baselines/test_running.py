@@ -45,7 +45,7 @@ def estimate(folder: Path, *, out: str = "p.json", **options: Any) -> Run:
 
 
 def names(folder: Path) -> set[str]:
-    """What stands beside the folder."""
+    """The names next to the folder."""
     return {path.name for path in folder.parent.iterdir()} - {folder.name}
 
 
@@ -59,17 +59,17 @@ def root_of_areas(first: Sequence[float], last: Sequence[float]) -> float:
 def test_the_file_holds_every_sequence_and_how_it_was_made(folder: Path) -> None:
     done = estimate(folder, power=0.5)
     data = (folder.parent / "p.json").read_bytes()
-    found = read_predictions(data, manifest=read_folder(folder).manifest)
-    assert found.unit == "scale_ratio"
+    predictions = read_predictions(data, manifest=read_folder(folder).manifest)
+    assert predictions.unit == "scale_ratio"
     document = json.loads(data)
     assert document["frame_gap"] == 5
     assert list(document["predictions"].values()) == done.scale_ratio.tolist()
-    assert found.meta is not None
-    assert set(found.meta) == {
+    assert predictions.meta is not None
+    assert set(predictions.meta) == {
         *("method", "version", "provenance", "parameters", "seconds", "n_fallback", "opencv"),
     }
-    assert found.meta["parameters"] == {"power": 0.5, "constant": 0.0, "refused": -1, "broken": -1}
-    assert found.meta["n_fallback"] == {}
+    assert predictions.meta["parameters"] == {"power": 0.5, "constant": 0.0, "refused": -1, "broken": -1}
+    assert predictions.meta["n_fallback"] == {}
     assert names(folder) == {"p.json"}
 
 
@@ -113,7 +113,7 @@ BOX_0, BOX_5 = "(50, 30, 90, 60)", "(45, 25, 95, 65)"
 
 
 @pytest.mark.parametrize(
-    ("spoil", "reason", "place", "message"),
+    ("spoil", "reason", "where", "message"),
     [
         (with_box(5), "no box in the target frame", "boxes.csv, sequence 1",
          "There is no box for the target; expected one."),
@@ -146,13 +146,13 @@ BOX_0, BOX_5 = "(50, 30, 90, 60)", "(45, 25, 95, 65)"
     ],
 )  # fmt: skip
 def test_a_fault_of_one_sequence_takes_its_fallback_and_is_counted(
-    folder: Path, spoil: Spoil, reason: str, place: str, message: str
+    folder: Path, spoil: Spoil, reason: str, where: str, message: str
 ) -> None:
     spoil(folder)
     done = estimate(folder)
     assert done.n_fallback == {reason: 1}
-    assert (done.examples[reason].where, done.examples[reason].message) == (place, message)
-    has_no_box = "boxes" in place and reason not in {"box is smaller than 4 px", "box lies outside the image"}
+    assert (done.examples[reason].where, done.examples[reason].message) == (where, message)
+    has_no_box = "boxes" in where and reason not in {"box is smaller than 4 px", "box lies outside the image"}
     boxes = read_folder(folder).boxes[1]
     assert done.scale_ratio[1] == (1.0 if has_no_box else root_of_areas(boxes[0], boxes[5]))
     assert done.meta["n_fallback"] == {reason: 1}
@@ -161,7 +161,7 @@ def test_a_fault_of_one_sequence_takes_its_fallback_and_is_counted(
     with pytest.raises(Rejected) as rejected:
         estimate(folder, strict=True)
     [problem] = rejected.value.problems
-    assert (problem.where, problem.message) == (place, message)
+    assert (problem.where, problem.message) == (where, message)
     assert "p.json" not in names(folder)
 
 
@@ -252,7 +252,7 @@ def test_a_fallback_of_the_ended_run_is_estimated_again(folder: Path) -> None:
 @pytest.mark.parametrize(
     "change", [{"power": 2.0}, {"frame_gap": 4}, {"boxes": True}], ids=["parameter", "gap", "boxes"]
 )
-def test_a_run_with_anything_else_begins_anew(folder: Path, change: dict[str, Any]) -> None:
+def test_a_run_with_anything_else_begins_again(folder: Path, change: dict[str, Any]) -> None:
     with pytest.raises(Ended):
         estimate(folder, progress=end_after(2))
     if change.pop("boxes", False):
@@ -268,8 +268,8 @@ def test_several_processes_give_the_same_file_as_one(folder: Path) -> None:
     made_folder(folder, n=20)
     image_path(folder, 1, 3).unlink()
     estimate(folder, out="one.json")
-    told: list[int] = []
-    estimate(folder, out="two.json", n_processes=2, progress=told.append)
+    reported: list[int] = []
+    estimate(folder, out="two.json", n_processes=2, progress=reported.append)
     assert values(folder, "two.json") == values(folder, "one.json")
-    assert told[-1] == 20
-    assert len(told) > 2
+    assert reported[-1] == 20
+    assert len(reported) > 2

@@ -1,4 +1,4 @@
-"""The dataset as it is downloaded is read as it is."""
+"""The downloaded dataset is read without a conversion."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ def box2d(frame: int) -> list[float]:
 
 
 def download(folder: Path, *, as_array: bool = False, **changes: Any) -> Path:
-    """A recording: its annotation file, and its folder of images beside it."""
+    """A recording: its annotation file, and its folder of images next to it."""
     with foreign_class("easydict.EasyDict") as make:
         frames = camera({7: [*range(N_FRAMES)]}, make, bag_stamp="/data/bags/0007")
         for frame, [seen] in enumerate(frames.values()):
@@ -38,10 +38,10 @@ def download(folder: Path, *, as_array: bool = False, **changes: Any) -> Path:
 
 @pytest.mark.parametrize("as_array", [False, True], ids=["list", "array"])
 def test_boxes_and_frames_are_those_of_the_annotation_files(tmp_path: Path, as_array: bool) -> None:
-    found = read_folder(download(tmp_path, as_array=as_array))
-    assert found.manifest.digest == read_manifest(tmp_path).digest
-    assert found.n_sequences == 2
-    clip = found.clip(1, cache=ImageCache())
+    folder = read_folder(download(tmp_path, as_array=as_array))
+    assert folder.manifest.digest == read_manifest(tmp_path).digest
+    assert folder.n_sequences == 2
+    clip = folder.clip(1, cache=ImageCache())
     np.testing.assert_allclose(clip.boxes, [box(frame) for frame in range(6)], rtol=1e-12)
     assert np.abs(clip.colour(0).astype(int) - picture(0, 6)).mean() < 4
 
@@ -91,7 +91,7 @@ def test_a_manifest_of_other_sequences_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("wrong", [None, [0.1, 0.2, 0.3], "four", [0.1, 0.2, 0.3, None], np.zeros((3, 4))])
-def test_an_object_without_a_box_is_refused_with_its_place(tmp_path: Path, wrong: object) -> None:
+def test_an_object_without_a_box_is_refused_with_its_position(tmp_path: Path, wrong: object) -> None:
     with pytest.raises(Rejected) as rejected:
         read_folder(download(tmp_path, box2d=wrong))
     problem = rejected.value.problems[0]

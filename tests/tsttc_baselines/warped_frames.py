@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 
 def texture(seed: int, *, width: int = 320, height: int = 240) -> Image:
-    """Grey blobs of several sizes, as rich in every place as in any other."""
+    """Grey blobs of several sizes, equally rich everywhere."""
     rng = np.random.default_rng(seed)
     total = np.zeros((height, width), dtype=np.float32)
     for sigma in (1.5, 3.0, 6.0, 12.0):

@@ -1,13 +1,13 @@
 """Simulate whether confidence intervals, tests, rank ranges and verdicts hold: `python -m tests.validity`.
 
 Errors of made-up methods on made-up recordings, where the truth is known: the models of `tests.error_models`.
-Everything is drawn anew in each repetition. The suite runs few repetitions; the command many, and prints the
+Each repetition draws everything again. The suite runs few repetitions; the command many, and prints the
 tables of `docs/uncertainty.md`.
 """
 
 from collections.abc import Iterator
 
-# Repetitions stand in columns, as score names do elsewhere; so many at a time fit into memory.
+# Repetitions are columns, as score names are elsewhere; this number of them fits into memory.
 CHUNK = 100
 
 

@@ -9,14 +9,14 @@ import numpy as np
 
 from tests import error_models
 from tests.validity import coverage, fields, percent, worlds
-from tests.validity.coverage import Coverage, Held
+from tests.validity.coverage import Coverage, Shares
 
 N_RECORDINGS: Final = (20, 50, 100, 700)
 # Fewer than the board takes, 10,000 and 9,999, and many more repetitions.
 N_RESAMPLES: Final = 2_000
 N_SIGN_FLIPS: Final = 1_999
 N_METHODS: Final = 8
-# Of fewer repetitions nothing is said.
+# A share of fewer repetitions is not shown.
 MIN_SHOWN: Final = 200
 # Recordings, how many of them make a day, and the correlation between two of a day.
 DAYS: Final = (
@@ -64,7 +64,7 @@ Row = tuple[object, ...]
 
 
 def models() -> tuple[error_models.Model, ...]:
-    """Those of the coverage table, the models that break the test's assumption at the end."""
+    """Models of the coverage table; those that break the test's assumption come last."""
     return (*error_models.available(), error_models.ONE_FAILS)
 
 
@@ -93,26 +93,26 @@ def coverage_rows(n: int) -> Iterator[Row]:
             yield coverage_row(model, n_recordings, coverage_of(model, n_recordings, n=n_here))
 
 
-def coverage_row(model: error_models.Model, n_recordings: int, found: Coverage) -> Row:
+def coverage_row(model: error_models.Model, n_recordings: int, simulated: Coverage) -> Row:
     """One row of the table; of the means the worse one first, as it is in all repetitions."""
-    if found.n_contradictions:
+    if simulated.n_contradictions:
         raise AssertionError(f"{model}, {n_recordings} recordings: intervals and p contradict each other")
-    worse = int(np.argmin(found.all.of_means))
+    worse = int(np.argmin(simulated.all.of_means))
 
-    def cell(share: Callable[[Held], float], held: Held, *, decimals: int = 1) -> str:
-        return percent(share(held), held.n, decimals=decimals) if held.n >= MIN_SHOWN else "–"
+    def cell(share: Callable[[Shares], float], shares: Shares, *, decimals: int = 1) -> str:
+        return percent(share(shares), shares.n, decimals=decimals) if shares.n >= MIN_SHOWN else "–"
 
     return (
         model,
         n_recordings,
-        f"{100 * found.share_shown:.0f} %",
-        cell(lambda held: held.of_means[worse], found.all),
-        cell(lambda held: held.of_means[1 - worse], found.all),
-        cell(lambda held: held.of_means[worse], found.shown),
-        cell(lambda held: held.of_difference, found.all),
-        cell(lambda held: held.of_difference, found.shown),
-        cell(lambda held: held.up_to_1_permille, found.all, decimals=2),
-        cell(lambda held: held.up_to_1_permille, found.shown, decimals=2),
+        f"{100 * simulated.share_shown:.0f} %",
+        cell(lambda shares: shares.of_means[worse], simulated.all),
+        cell(lambda shares: shares.of_means[1 - worse], simulated.all),
+        cell(lambda shares: shares.of_means[worse], simulated.shown),
+        cell(lambda shares: shares.of_difference, simulated.all),
+        cell(lambda shares: shares.of_difference, simulated.shown),
+        cell(lambda shares: shares.up_to_1_permille, simulated.all, decimals=2),
+        cell(lambda shares: shares.up_to_1_permille, simulated.shown, decimals=2),
     )
 
 
@@ -121,8 +121,8 @@ def sequences_rows(n: int) -> Iterator[Row]:
     for n_recordings in (100, 300, 700):
         for rho in (0.05, 0.2):
             rng = np.random.default_rng([n_recordings, int(100 * rho)])
-            found = coverage.by_sequences(rho, n_recordings=n_recordings, n=n // 3, rng=rng)
-            yield n_recordings, rho, percent(found, n // 3)
+            share = coverage.by_sequences(rho, n_recordings=n_recordings, n=n // 3, rng=rng)
+            yield n_recordings, rho, percent(share, n // 3)
 
 
 def ranks_rows(n: int) -> Iterator[Row]:
@@ -133,7 +133,7 @@ def ranks_rows(n: int) -> Iterator[Row]:
     rows += [((0.0,) * n_methods, rho, True, 100) for n_methods in (5, 10, 50) for rho in fields.SHARED]
     for levels, rho, with_quoted_row, n_recordings in rows:
         rng = np.random.default_rng([n_recordings, len(levels), int(10 * rho), with_quoted_row])
-        found = fields.ranks(
+        ranks = fields.ranks(
             levels,
             n_recordings=n_recordings,
             correlation=rho,
@@ -142,30 +142,30 @@ def ranks_rows(n: int) -> Iterator[Row]:
             rng=rng,
         )
         name = f"{len(levels)}, {'alike' if not any(levels) else 'spread'}"
-        yield name, "yes" if with_quoted_row else "no", n_recordings, rho, *_held(found)
+        yield name, "yes" if with_quoted_row else "no", n_recordings, rho, *_rank_cells(ranks)
 
 
 def odd_rows(n: int) -> Iterator[Row]:
-    """The same of ten equally good methods of which one comes to its mean by another route."""
+    """The same of ten equally good methods; one of them comes to its mean by another route."""
     for name in ("informative", "one fails"):
         for n_recordings in (50, 100, 700):
             rng = np.random.default_rng([n_recordings, *name.encode()])
             draw = worlds.one_odd(name, n_methods=10)
             means = np.ones(10)
-            found = fields.ranks_of(draw, means=means, n_recordings=n_recordings, n=n // 2, rng=rng)
-            yield f"10, one odd: {name}", "no", n_recordings, "–", *_held(found)
+            ranks = fields.ranks_of(draw, means=means, n_recordings=n_recordings, n=n // 2, rng=rng)
+            yield f"10, one odd: {name}", "no", n_recordings, "–", *_rank_cells(ranks)
 
 
-def _held(found: fields.Ranks) -> Row:
-    return percent(found.all_at_once, found.n), percent(found.each, found.n), f"{found.mean_width:.1f}"
+def _rank_cells(ranks: fields.Ranks) -> Row:
+    return percent(ranks.all_at_once, ranks.n), percent(ranks.each, ranks.n), f"{ranks.mean_width:.1f}"
 
 
 def days_rows(n: int) -> Iterator[Row]:
-    """What becomes of all this where recordings of one day are alike, with recordings and days as units."""
+    """The same shares where recordings of one day are alike, with recordings and with days as units."""
     for n_recordings, per_day, rho in DAYS:
         model = worlds.day_model(per_day, rho)
         for unit in ("recording", "day"):
-            found = coverage_of(model, n_recordings, n=n // 4, by_day=per_day if unit == "day" else None)
+            simulated = coverage_of(model, n_recordings, n=n // 4, by_day=per_day if unit == "day" else None)
             draw = worlds.in_days(per_day, rho, n_methods=N_METHODS)
             if unit == "day":
                 draw = worlds.by_day(draw, per_day=per_day)
@@ -173,9 +173,9 @@ def days_rows(n: int) -> Iterator[Row]:
             ranks = fields.ranks_of(
                 draw, means=np.ones(N_METHODS), n_recordings=n_recordings, n=n // 20, rng=rng
             )
-            held = found.all
-            cells = [percent(share, held.n) for share in (min(held.of_means), held.of_difference)]
-            small = percent(held.up_to_1_permille, held.n, decimals=2)
+            shares = simulated.all
+            cells = [percent(share, shares.n) for share in (min(shares.of_means), shares.of_difference)]
+            small = percent(shares.up_to_1_permille, shares.n, decimals=2)
             yield n_recordings, per_day, rho, unit, *cells, small, percent(ranks.all_at_once, ranks.n)
 
 

@@ -21,7 +21,7 @@ def as_drawn(drawn: Drawn) -> Drawn:
 
 
 def days_of(per_day: int) -> Callable[[Drawn], Drawn]:
-    """Make days the units: so many recordings one after the other."""
+    """Make days the units: `per_day` recordings one after the other."""
 
     def days(drawn: Drawn) -> Drawn:
         return Drawn(*(summed(part, per_day=per_day) for part in (drawn.counts, drawn.first, drawn.second)))
@@ -30,7 +30,7 @@ def days_of(per_day: int) -> Callable[[Drawn], Drawn]:
 
 
 @dataclass(frozen=True)
-class Held:
+class Shares:
     """Shares of `n` repetitions: intervals that hold the truth, p < 0.05 and p ≤ 0.001 by chance.
 
     Both methods are equally good. `of_means` are the intervals of the first and of the second method's mean.
@@ -51,13 +51,13 @@ class Coverage:
     `n_contradictions` counts differences whose interval excludes 0 while p ≥ 0.05, or holds 0 while p < 0.05.
     """
 
-    all: Held
-    shown: Held
+    all: Shares
+    shown: Shares
     n_contradictions: int
 
     @property
     def share_shown(self) -> float:
-        """Of all repetitions those for which the board shows intervals."""
+        """The share of all repetitions for which the board shows intervals."""
         return self.shown.n / self.all.n
 
 
@@ -76,8 +76,8 @@ def coverage(
     `units` makes the resampled units of the recordings that were drawn.
     """
     mean = model.mean()
-    # One row for each share of `Held`, one column for each repetition, and which of them are shown.
-    found: list[Booleans] = []
+    # One row for each of the `Shares`, one column for each repetition, and which of them are shown.
+    holds: list[Booleans] = []
     shown: list[Booleans] = []
     for chunk in chunks(n):
         drawn = units(model.draw(n_recordings, chunk, rng))
@@ -89,15 +89,15 @@ def coverage(
         flipped = differences.sign_flips(drawn.first - drawn.second, drawn.counts, rng=rng, n_flips=n_flips)
         holds_zero = (flipped.low <= 0) & (flipped.high >= 0)
         of_means = (low <= mean) & (mean <= high)
-        found.append(np.stack([*of_means, holds_zero, flipped.p < 0.05, flipped.p <= 0.001]))
-    every, is_shown = np.concatenate(found, axis=1), np.concatenate(shown)
-    return Coverage(_held(every), _held(every[:, is_shown]), int((every[2] == every[3]).sum()))
+        holds.append(np.stack([*of_means, holds_zero, flipped.p < 0.05, flipped.p <= 0.001]))
+    every, is_shown = np.concatenate(holds, axis=1), np.concatenate(shown)
+    return Coverage(_shares(every), _shares(every[:, is_shown]), int((every[2] == every[3]).sum()))
 
 
-def _held(found: Booleans) -> Held:
-    n = found.shape[1]
-    first, second, zero, small, tiny = (found.sum(axis=1) / max(n, 1)).tolist()
-    return Held((first, second), zero, small, tiny, n)
+def _shares(holds: Booleans) -> Shares:
+    n = holds.shape[1]
+    first, second, zero, small, tiny = (holds.sum(axis=1) / max(n, 1)).tolist()
+    return Shares((first, second), zero, small, tiny, n)
 
 
 def by_sequences(model_rho: float, *, n_recordings: int, n: int, rng: np.random.Generator) -> float:

@@ -67,14 +67,14 @@ def ranks_of(
     rng: np.random.Generator,
     quoted: float | None = None,
 ) -> Ranks:
-    """Make the rank ranges of methods with these true `means`, beside a row quoted with this value."""
+    """Make the rank ranges of methods with these true `means`, and a row quoted with the value `quoted`."""
     everybody = means if quoted is None else np.append(means, quoted)
     lowest = 1 + (everybody[None, :] < means[:, None]).sum(axis=1)[:, None]
     highest = len(everybody) - (everybody[None, :] > means[:, None]).sum(axis=1)[:, None]
     n_all = n_each = width = 0.0
     for chunk in chunks(n):
         sums, counts = draw(n_recordings, chunk, rng)
-        found = ranges.rank_ranges(
+        computed = ranges.rank_ranges(
             sums,
             published=sums.sum(axis=1) / counts.sum(axis=0),
             usable=np.ones(chunk, dtype=np.bool_),
@@ -82,10 +82,10 @@ def ranks_of(
             quoted=None if quoted is None else _quoted(quoted, counts),
         )
         # A tied method may stand anywhere among its equals; the range must leave room for all of it.
-        held = (found.low <= lowest) & (found.high >= highest)
-        n_all += held.all(axis=0).sum()
-        n_each += held.mean(axis=0).sum()
-        width += (found.high - found.low + 1).mean(axis=0).sum()
+        is_inside = (computed.low <= lowest) & (computed.high >= highest)
+        n_all += is_inside.all(axis=0).sum()
+        n_each += is_inside.mean(axis=0).sum()
+        width += (computed.high - computed.low + 1).mean(axis=0).sum()
     return Ranks(n_all / n, n_each / n, width / n, n)
 
 

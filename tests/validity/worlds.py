@@ -1,4 +1,4 @@
-"""Fields of equally good methods of which one is odd, and recordings that come in days."""
+"""Fields of equally good methods, one of them odd, and recordings that come in days."""
 
 from statistics import NormalDist
 from typing import Final

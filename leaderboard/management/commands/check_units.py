@@ -40,10 +40,10 @@ class Command(RefusingCommand):
                 "truth can name another one."
             )
         self.stdout.write("SE factor  correlation       p  overall MiD of")
-        for what, found in rows:
+        for what, check in rows:
             numbers = (
-                f"{found.se_factor:9.2f}  {found.correlation:11.3f}  {found.p:6.4f}"
-                if found
+                f"{check.se_factor:9.2f}  {check.correlation:11.3f}  {check.p:6.4f}"
+                if check
                 else f"{'–':>9}  {'–':>11}  {'–':>6}"
             )
             self.stdout.write(f"{numbers}  {what}")

@@ -31,7 +31,7 @@ class Command(BaseCommand):
     help = "Grant TSTTC_APPLICATION_ROLE what the application needs; run as the owner, after migrate."
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Grant, or say that there is nobody to grant anything to."""
+        """Grant, or say that no role is set."""
         role = settings.APPLICATION_ROLE
         if not role:
             self.stdout.write("TSTTC_APPLICATION_ROLE is not set: the application works as the owner.")
@@ -50,9 +50,9 @@ def make_role(role: str, *, password: str) -> None:
         raise CommandError("TSTTC_APPLICATION_PASSWORD is not set; expected the password of the role.")
     with connection.cursor() as cursor:
         cursor.execute(_ROLE, [role])
-        found = cursor.fetchone()
-        rights = [name for name, has in zip(_ABOVE_THE_OWNER, found or (), strict=False) if has]
-        if found and rights and not found[-1]:
+        attributes = cursor.fetchone()
+        rights = [name for name, has in zip(_ABOVE_THE_OWNER, attributes or (), strict=False) if has]
+        if attributes and rights and not attributes[-1]:
             raise CommandError(
                 f"The role {role} has {' and '.join(rights)}; expected neither of "
                 f"{', '.join(_ABOVE_THE_OWNER)}. "
@@ -61,10 +61,10 @@ def make_role(role: str, *, password: str) -> None:
             )
         # It is in no group, and takes no rights that somebody gave it before. An owner who is no superuser
         # may make a role without these three rights, and may not name them in a change.
-        named = rights if found else _ABOVE_THE_OWNER
+        named = rights if attributes else _ABOVE_THE_OWNER
         options = " ".join(("LOGIN", *(f"NO{name}" for name in ("CREATEDB", "CREATEROLE", *named))))
         statement = sql.SQL("{} ROLE {} WITH {} PASSWORD {}").format(
-            sql.SQL("ALTER" if found else "CREATE"),
+            sql.SQL("ALTER" if attributes else "CREATE"),
             sql.Identifier(role),
             sql.SQL(options),
             sql.Literal(password),

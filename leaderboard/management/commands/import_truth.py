@@ -23,7 +23,7 @@ class Command(RefusingCommand):
         parser.add_argument("--protocol", default="tsttc-1", choices=["tsttc-1", "toolkit"])
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Import, and say what came of it."""
+        """Import, and print the edition."""
         edition = ground_truth.import_truth(
             split_name=options["split"],
             path=options["path"],

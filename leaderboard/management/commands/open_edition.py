@@ -21,7 +21,7 @@ from leaderboard.storage import files
 
 
 class Command(RefusingCommand):
-    """Opens an edition beside the published one."""
+    """Opens an edition next to the published one."""
 
     help = (
         "Open an edition with corrected ground truth and re-score all submissions that are not withdrawn. "
@@ -80,10 +80,10 @@ class Command(RefusingCommand):
         """Say what the labels of a file would change, and write it down by recording if asked."""
         if not options["dry_run"]:
             raise CommandError("--diff needs --dry-run.")
-        found = label_changes.look(split_name=options["split"], path=options["truth"])
-        counts, rows = found.counts, found.recordings
+        changes = label_changes.look(split_name=options["split"], path=options["truth"])
+        counts, rows = changes.counts, changes.recordings
         self.stdout.write(
-            f"Against {found.edition}: {counted(counts.n_added, 'sequence')} added, "
+            f"Against {changes.edition}: {counted(counts.n_added, 'sequence')} added, "
             f"{counts.n_removed} removed, {counts.n_changed} changed; {counts.n_renumbered} with "
             f"another anno_id; in {counted(len(rows), 'recording')}. Nothing was kept."
         )
@@ -118,10 +118,10 @@ def counts(change: history.TruthChange | None) -> str:
     if change is None:
         return "different ground truth, not compared yet"
     added = counted(change.n_added, "sequence")
-    said = f"{added} added, {change.n_removed} removed, {change.n_changed} changed"
+    text = f"{added} added, {change.n_removed} removed, {change.n_changed} changed"
     if change.n_renumbered is None:
-        return said
-    return f"{said}; {counted(change.n_renumbered, 'sequence has', 'sequences have')} another anno_id"
+        return text
+    return f"{text}; {counted(change.n_renumbered, 'sequence has', 'sequences have')} another anno_id"
 
 
 def line(progress: corrections.RescoringProgress) -> str:

@@ -10,7 +10,7 @@ from leaderboard.management.arguments import AccountCommand, account_of
 from leaderboard.models import MailKind
 from leaderboard.people import second_factor
 
-_TOLD = (
+_MAIL = (
     "A maintainer removed the second factor and the recovery codes of your account: you sign in without "
     "it again. If you did not ask for this, tell us at once: {contact}\n\n"
     "Set up a new second factor here: {site}/accounts/2fa/\n\n--\n{name}\n{site}"
@@ -26,7 +26,7 @@ class Command(AccountCommand):
         """Reset, and tell the person by mail."""
         user = account_of(options)
         event = second_factor.reset(user=user, reason=options["reason"])
-        text = _TOLD.format(contact=settings.CONTACT_EMAIL, site=settings.SITE_URL, name=settings.SITE_NAME)
+        text = _MAIL.format(contact=settings.CONTACT_EMAIL, site=settings.SITE_URL, name=settings.SITE_NAME)
         mail = outbox.tell(
             kind=MailKind.ACCOUNT,
             user=user,

@@ -24,14 +24,14 @@ class Command(BaseCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """One line on standard output, or where the chain breaks and exit code 1."""
-        found = audit.verify(expected_hash=options["expect"])
-        if found.breaks:
-            places = "\n".join(
+        verification = audit.verify(expected_hash=options["expect"])
+        if verification.breaks:
+            lines = "\n".join(
                 f"  event {each.event_id}: {each.what}" if each.event_id else f"  {each.what}"
-                for each in found.breaks
+                for each in verification.breaks
             )
-            raise CommandError(f"The audit log of {found.n_events:,} events is damaged:\n{places}")
-        self.stdout.write(f"audit: {found.n_events:,} events, unbroken, last hash {found.tip}")
-        rest = found.unsealed
+            raise CommandError(f"The audit log of {verification.n_events:,} events is damaged:\n{lines}")
+        self.stdout.write(f"audit: {verification.n_events:,} events, unbroken, last hash {verification.tip}")
+        rest = verification.unsealed
         if rest.n_events:
             self.stdout.write(f"not sealed yet: {rest.n_events:,}, the oldest for {rest.oldest_age_s:.0f} s")

@@ -58,7 +58,7 @@ class AccountAdapter(DefaultAccountAdapter):
         outbox.send_or_keep(message=message, now=timezone.now())
 
     def get_login_redirect_url(self, request: HttpRequest) -> str:
-        """Where somebody goes who signed in without a page in mind: a maintainer to what waits for them."""
+        """Return the page after a sign-in that asked for none: for maintainers that of their tasks."""
         user = request.user
         if isinstance(user, User) and user.is_maintainer:
             return reverse("maintain")
@@ -85,7 +85,7 @@ class AccountAdapter(DefaultAccountAdapter):
         return user
 
     def is_login_by_code_required(self, login: Login) -> bool:
-        """Whether a mailed code is needed: else who knows a maintainer's password sets up their own app."""
+        """Whether a mailed code is needed: a maintainer's password alone must not set up a new app."""
         user = login.user
         if not isinstance(user, User) or not second_factor.is_required(user):
             return False
@@ -114,7 +114,7 @@ class AccountAdapter(DefaultAccountAdapter):
 
 
 class OwnersAddress(forms.BaseSignupForm):
-    """A sign-up form for which an address that somebody else has not proved is free."""
+    """A sign-up form that accepts an address that another account has, but has not proved."""
 
     def validate_unique_email(self, value: str) -> str:
         if addresses.accounts_of(value).exists():
@@ -150,7 +150,7 @@ class SignupForm(OwnersAddress, forms.SignupForm):
 
 class ConfirmAddressForm(forms.ConfirmEmailVerificationCodeForm):
     def clean_code(self) -> Any:
-        """The code. With the right one, nobody who has not proved the address keeps the owner from it."""
+        """Return the code; the right one releases the address from accounts that have not proved it."""
         forms.BaseConfirmCodeForm.clean_code(self)
         if self.user is None:  # the account gave way, or there is none
             raise get_adapter().validation_error("incorrect_code")
@@ -160,7 +160,7 @@ class ConfirmAddressForm(forms.ConfirmEmailVerificationCodeForm):
 
 class ResetPasswordForm(forms.ResetPasswordForm):
     def clean_email(self) -> Any:
-        """The address. An account that nobody confirmed is none: whoever made it may have another way in."""
+        """Return the address; an unconfirmed account gets no mail: its maker may have another way in."""
         address = super().clean_email()
         theirs = set(addresses.accounts_of(address))
         self.users = [user for user in self.users if user in theirs]  # type: ignore[has-type]  # allauth sets it here alone
@@ -172,7 +172,7 @@ def _login_of(credentials: dict[str, Any]) -> str:
 
 
 def known_address_key(login: str, address: str) -> str:
-    """Where the cache says that this address has signed in here before."""
+    """Return the cache key of the mark that this address has signed in here before."""
     # A hash: who signs in from where is nobody's business in a table of the database.
     return "known-address:" + hashlib.sha256(f"{login}\n{address}".encode()).hexdigest()
 

@@ -31,7 +31,7 @@ SETTINGS: Final[dict[str, Any]] = {
     "ACCOUNT_EMAIL_VERIFICATION_SUPPORTS_RESEND": True,
     "ACCOUNT_LOGIN_BY_CODE_SUPPORTS_RESEND": True,
     "ACCOUNT_EMAIL_CONFIRMATION_AUTHENTICATED_REDIRECT_URL": "/accounts/email/",
-    # Whoever changes how one signs in, its owner is told by mail.
+    # A change of how one signs in is mailed to the owner of the account.
     "ACCOUNT_EMAIL_NOTIFICATIONS": True,
     "MFA_ADAPTER": f"{_HERE}.accounts.SecondFactorAdapter",
     "MFA_FORMS": {
@@ -46,7 +46,7 @@ SETTINGS: Final[dict[str, Any]] = {
     },
     # Who signs up reads of the rules first, and chooses a name.
     "SOCIALACCOUNT_AUTO_SIGNUP": False,
-    # Another way into the account: whoever finds an open session does not add one.
+    # A found open session must not be enough to add another way into the account.
     "SOCIALACCOUNT_REAUTHENTICATION_REQUIRED": True,
     "SOCIALACCOUNT_REQUESTS_TIMEOUT": 5,
 }

@@ -1,6 +1,6 @@
-"""Codes of the second factor: how often somebody may guess, and that a code works only once.
+"""Codes of the second factor: guesses are limited, and a code works only once.
 
-Wrong codes are counted by account and address, so that somebody who knows the password and guesses codes
+Wrong codes are counted by account and address, so that a person who knows the password and guesses codes
 never locks out the owner at another address; and by account alone, for guesses from many addresses. The last
 count does not hold at an address where the account has given a right code before. So 50 guesses a day come
 from all unknown addresses together, and 50 from each known one. A guess is right with probability 1.1e-6 (one

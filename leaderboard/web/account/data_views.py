@@ -41,7 +41,7 @@ class DeleteForm(SiteForm):
 
 @own_form
 def data(request: HttpRequest) -> HttpResponse:
-    """What is kept, how to download it, and the form that deletes it."""
+    """Show which data is kept, how to download it, and the form that deletes it."""
     user = cast("User", request.user)
     form = DeleteForm.asked(request)
     if form.is_valid():

@@ -51,7 +51,7 @@ class MalformedAnswer(OAuth2Error):
 
 @contextmanager
 def _malformed_answers() -> Iterator[None]:
-    """What allauth raises for an answer of another shape than it expects, as an error of the provider."""
+    """Turn what allauth raises for an answer of an unexpected shape into an error of the provider."""
     try:
         yield
     except requests.RequestException:
@@ -79,7 +79,7 @@ class _ProviderViews(OAuth2Adapter):
             return super().parse_token(data)
 
     def complete_login(self, request: HttpRequest, app: Any, token: Any, **kwargs: Any) -> SocialLogin:
-        """Who signs in, with at most one address, which is verified."""
+        """Return the login with at most one address, which is verified."""
         with _malformed_answers():
             login = super().complete_login(request, app, token, **kwargs)
             verified = self.verified(login)
@@ -92,8 +92,8 @@ class _ProviderViews(OAuth2Adapter):
         """The addresses that the provider has verified, the primary one first."""
         raise NotImplementedError
 
-    def kept(self, said: Mapping[str, Any]) -> dict[str, str]:
-        """What of the provider's words is kept, beside its number of the person."""
+    def kept(self, profile: Mapping[str, Any]) -> dict[str, str]:
+        """Return what is kept of the provider's profile, next to its number of the person."""
         return {}
 
 
@@ -114,8 +114,8 @@ class GitHubViews(_ProviderViews, GitHubOAuth2Adapter):
         rows = [row for row in login.email_addresses if row.verified is True]
         return _sorted(_address(row.email, is_primary=row.primary is True) for row in rows)
 
-    def kept(self, said: Mapping[str, Any]) -> dict[str, str]:
-        return {"login": str(said.get("login", ""))[:100]}
+    def kept(self, profile: Mapping[str, Any]) -> dict[str, str]:
+        return {"login": str(profile.get("login", ""))[:100]}
 
 
 def _address(text: str, *, is_primary: bool) -> EmailAddress:

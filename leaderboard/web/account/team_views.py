@@ -23,7 +23,7 @@ from leaderboard.web.forms import SiteForm
 
 
 class SignupNameForm(forms.Form):
-    """The name that signing up asks for, beside address and password."""
+    """The name that sign-up asks for, next to address and password."""
 
     name = forms.CharField(
         label="Name shown on the board",
@@ -97,18 +97,18 @@ def _page(request: HttpRequest, *, status: int = 200, **context: Any) -> HttpRes
     return shown_once.render_with(request, "account/team.html", context, at="team", status=status)
 
 
-def _done(request: HttpRequest, action: Callable[[], object], *, told: str) -> HttpResponse:
+def _done(request: HttpRequest, action: Callable[[], object], *, flash_message: str) -> HttpResponse:
     try:
         action()
     except Refused as refusal:
         return _page(request, refusal=str(refusal), status=422)
-    messages.success(request, told)
+    messages.success(request, flash_message)
     return redirect("team")
 
 
 @own_form
 def team(request: HttpRequest) -> HttpResponse:
-    """Who is in it and who may come in. A name that is sent founds the team, or renames it."""
+    """Show the members and invitations of the team. A name that is sent founds the team, or renames it."""
     if request.method != "POST":
         return _page(request)
     user = cast("User", request.user)
@@ -140,24 +140,24 @@ def invite(request: HttpRequest) -> HttpResponse:
 @own_action
 def revoke_invitation(request: HttpRequest, invitation_id: UUID) -> HttpResponse:
     """End a link that nobody has used."""
-    found = get_object_or_404(Invitation, team=_own_team(request), pk=invitation_id)
+    invitation = get_object_or_404(Invitation, team=_own_team(request), pk=invitation_id)
     user = cast("User", request.user)
     return _done(
         request,
-        lambda: invitations.revoke(invitation=found, actor=user, now=timezone.now()),
-        told="The invitation is revoked.",
+        lambda: invitations.revoke(invitation=invitation, actor=user, now=timezone.now()),
+        flash_message="The invitation is revoked.",
     )
 
 
 @own_action
 def leave(request: HttpRequest) -> HttpResponse:
-    """Go out of one's team. Whoever would leave methods to nobody says that they know."""
+    """Leave one's team; a last member with methods has to confirm it."""
     _own_team(request)
     user = cast("User", request.user)
     if _team_page(user, now=timezone.now())["would_be_lost"] and not request.POST.get("confirm"):
         sentence = "Confirm that the private methods become inaccessible; expected a tick."
         return _page(request, refusal=sentence, status=422)
-    return _done(request, lambda: teams.leave(user=user), told="You left the team.")
+    return _done(request, lambda: teams.leave(user=user), flash_message="You left the team.")
 
 
 @own_action
@@ -167,7 +167,7 @@ def remove(request: HttpRequest, handle: UUID) -> HttpResponse:
     return _done(
         request,
         lambda: teams.remove(team=own, member=member, actor=cast("User", request.user)),
-        told=f"{member.email} is no longer in the team.",
+        flash_message=f"{member.email} is no longer in the team.",
     )
 
 
@@ -178,7 +178,7 @@ def hand_over(request: HttpRequest, handle: UUID) -> HttpResponse:
     return _done(
         request,
         lambda: teams.hand_over(team=own, to=member, actor=cast("User", request.user)),
-        told=f"{member.email} owns the team now.",
+        flash_message=f"{member.email} owns the team now.",
     )
 
 
@@ -186,16 +186,16 @@ def hand_over(request: HttpRequest, handle: UUID) -> HttpResponse:
 @sensitive_variables("secret")
 @asks_first
 def join(request: HttpRequest, secret: str) -> HttpResponse:
-    """Say who invites and what coming into the team means, and come in. A visitor is told who invites."""
+    """Show who invites and what joining means, and join the team; a visitor sees who invites."""
     user, now = cast("User", request.user), timezone.now()
     try:
-        found = invitations.find(secret=secret, now=now)
-        if found is None:
+        invitation = invitations.find(secret=secret, now=now)
+        if invitation is None:
             raise Http404
         if not user.is_authenticated:
             if request.method == "POST":
                 return redirect_to_login(request.get_full_path())
-            return render(request, "account/invited.html", {"invitation": found})
+            return render(request, "account/invited.html", {"invitation": invitation})
         if request.method == "POST":
             own = invitations.accept(secret=secret, user=user, now=now)
             messages.success(request, f"You are now in the team {own.name}.")
@@ -204,4 +204,6 @@ def join(request: HttpRequest, secret: str) -> HttpResponse:
         return render(request, "account/unusable.html", {"sentence": str(refusal)}, status=410)
     except Refused as refusal:
         return _page(request, refusal=str(refusal), status=422)
-    return render(request, "account/join.html", {"meaning": invitations.meaning(invitation=found, user=user)})
+    return render(
+        request, "account/join.html", {"meaning": invitations.meaning(invitation=invitation, user=user)}
+    )

@@ -17,7 +17,7 @@ from leaderboard.web.formatting import grouped
 PER_PAGE: Final = 100
 ALL_COLUMNS: Final = "both"
 NAMES: Final = ("at", "sort", "columns", *filters.FILTERS, "page")
-"""What a view of a board reads of its address."""
+"""The parameters that a view of a board reads from its address."""
 _MAX_PAGE_DIGITS: Final = 6
 
 
@@ -54,7 +54,7 @@ class BoardQuery:
         return "?" + urlencode({name: wanted[name] for name in NAMES if wanted.get(name)})
 
     def kept(self, *names: str) -> tuple[tuple[str, str], ...]:
-        """What a form that asks for the rest has to send along."""
+        """Return the parameters that a form for the others has to send along."""
         return tuple((name, self.given[name]) for name in names if name in self.given)
 
 
@@ -72,7 +72,7 @@ def forgiving(
 
 
 def parse(query: Mapping[str, str], *, now: datetime, has_time: bool = True) -> BoardQuery:
-    """The view that an address asks for; what it names beside is not looked at.
+    """Return the view that an address asks for; other parameters are ignored.
 
     `has_time` is False for the board of an edition, which is as it is. Raises one of `FAULTS`.
     """
@@ -118,7 +118,7 @@ def tools(
     faults: Mapping[str, str],
     latest_day: date | None,
 ) -> dict[str, Any]:
-    """What stands above this board: links of columns, and the form of the search and the filters.
+    """Return what is above this board: links of columns, and the form of the search and the filters.
 
     `asked` is the address' query, and `faults` what is wrong with it, by parameter. `latest_day` is the last
     day as of which there is a board to be asked for; None where there is no other time.

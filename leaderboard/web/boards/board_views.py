@@ -24,10 +24,10 @@ MAIN_SPLIT = "test"
 @require_safe
 def board(request: HttpRequest, split: str) -> HttpResponse:
     """A split's board, in the order that `?sort=` asks for, now or as it stood `?at=` a time."""
-    found = split_or_404(request, split)
+    split_row = split_or_404(request, split)
     # Asked for only by a page that tells it: a board of the past does not.
-    news = SimpleLazyObject(lambda: edition_tables.news(found))
-    return draw_board(request, "boards/board.html", split=found, news=news)
+    news = SimpleLazyObject(lambda: edition_tables.news(split_row))
+    return draw_board(request, "boards/board.html", split=split_row, news=news)
 
 
 def draw_board(
@@ -80,24 +80,26 @@ def _shown(
 
 @require_safe
 def editions(request: HttpRequest, split: str) -> HttpResponse:
-    """Every edition that ever was a split's board, and why each became it."""
-    found = split_or_404(request, split)
-    log = history.changelog(found)
-    rows = [(past, edition_tables.past_change(past)) for past in history.history(found, log)]
-    return render(request, "boards/editions/editions.html", {"split": found, "rows": rows, "changelog": log})
+    """List every edition that ever was a split's board, and why each became it."""
+    split_row = split_or_404(request, split)
+    log = history.changelog(split_row)
+    rows = [(past, edition_tables.past_change(past)) for past in history.history(split_row, log)]
+    return render(
+        request, "boards/editions/editions.html", {"split": split_row, "rows": rows, "changelog": log}
+    )
 
 
 @require_safe
 def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """The board of one edition, for ever."""
-    found = get_object_or_404(snapshots.editions(), split=split, number=number)
-    past = history.record_of(found)
+    row = get_object_or_404(snapshots.editions(), split=split, number=number)
+    past = history.record_of(row)
     return draw_board(
         request,
         "boards/editions/edition.html",
-        split=found.split,
-        edition=found,
+        split=row.split,
+        edition=row,
         past=past,
         change=edition_tables.past_change(past),
-        ttc_ranges=tables.counted_ranges(found.rules, found.ground_truth.counts),
+        ttc_ranges=tables.counted_ranges(row.rules, row.ground_truth.counts),
     )

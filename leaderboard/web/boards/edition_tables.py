@@ -20,7 +20,7 @@ _STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}
 
 
 def truth_words(change: history.TruthChange | None) -> str:
-    """What differs between two ground truths, in words; empty if nothing does.
+    """Return the difference of two ground truths in words; empty if nothing differs.
 
     >>> truth_words(history.TruthChange(n_added=3, n_removed=0, n_changed=12, n_renumbered=0))
     '12 labels corrected, 3 sequences added'
@@ -58,7 +58,7 @@ def _change_words(change: history.TruthChange | None, old: Edition, new: Edition
 
 
 def news(split: Split) -> str:
-    """What last changed on a board, for its head; empty while it has its first edition."""
+    """Return the last change of a board, for its head; empty while it has its first edition."""
     publication = history.latest_change(split)
     if publication is None or publication.replaced is None:
         return ""
@@ -69,12 +69,12 @@ def news(split: Split) -> str:
 
 
 def past_change(past: history.EditionRecord) -> str:
-    """What changed since the edition that this one followed."""
+    """Return the change from the edition that this one followed."""
     return _change_words(past.change, past.followed, past.edition) if past.followed else "the first"
 
 
 def rescored_notice(rescored: history.Rescored | None) -> dict[str, Any] | None:
-    """What the last change of the board did to a submission; None where it changed nothing for it."""
+    """Return the effect of the board's last change on a submission; None where it had none."""
     if rescored is None:
         return None
     old, new, publication = rescored.old, rescored.new, rescored.publication
@@ -118,7 +118,7 @@ def _mid(evaluation: Evaluation | None) -> str:
 
 
 def running(edition: Edition, progress: RescoringProgress) -> dict[str, Any]:
-    """How far the re-scoring of an edition is; a waiting page sends `seen` along, to be told what is new."""
+    """Return how far the re-scoring of an edition is; a waiting page sends `seen` to ask what is new."""
     parts = [f"{grouped(progress.n_done)} of {grouped(progress.n_total)}"]
     if progress.n_rejected:
         parts.append(f"{grouped(progress.n_rejected)} rejected")
@@ -148,19 +148,19 @@ def rate_words(rate_per_s: float) -> str:
     return f"{rate_per_s:.1f} per second" if rate_per_s >= 1 else f"{60 * rate_per_s:.0f} per minute"
 
 
-def change_table(found: Preview) -> dict[str, Any]:
+def change_table(preview: Preview) -> dict[str, Any]:
     """A preview, as the comparison's template places it."""
     return {
-        "headings": [score_heading(name) for name in found.names],
-        "rows": [_change_row(change, found.names) for change in found.entries],
-        "n_rejected_in_both": len(found.changes) - len(found.entries),
-        "truth": _change_words(found.truth, found.published, found.edition),
-        "totals": _totals(found),
+        "headings": [score_heading(name) for name in preview.names],
+        "rows": [_change_row(change, preview.names) for change in preview.entries],
+        "n_rejected_in_both": len(preview.changes) - len(preview.entries),
+        "truth": _change_words(preview.truth, preview.published, preview.edition),
+        "totals": _totals(preview),
     }
 
 
-def _totals(found: Preview) -> tuple[tuple[str, str], ...]:
-    truth = found.truth
+def _totals(preview: Preview) -> tuple[tuple[str, str], ...]:
+    truth = preview.truth
     sequences: tuple[tuple[str, str], ...] = (("sequences", "not compared"),)
     if truth is not None:
         sequences = (
@@ -171,10 +171,10 @@ def _totals(found: Preview) -> tuple[tuple[str, str], ...]:
         )
     return (
         *sequences,
-        ("entries", grouped(len(found.entries))),
-        ("entries changed", grouped(found.n_changed)),
-        ("ranks changed", grouped(found.n_moved)),
-        ("newly rejected", grouped(found.n_newly_rejected)),
+        ("entries", grouped(len(preview.entries))),
+        ("entries changed", grouped(preview.n_changed)),
+        ("ranks changed", grouped(preview.n_moved)),
+        ("newly rejected", grouped(preview.n_newly_rejected)),
     )
 
 

@@ -1,6 +1,6 @@
 """Exports of a board: the view of its page as CSV, LaTeX, Markdown and BibTeX.
 
-They hold what everybody sees, whoever takes them, since they end up in papers. `mine=1` adds the rows of
+They contain what everybody sees, for every user, since they end up in papers. `mine=1` adds the rows of
 one's own that others do not see, or not under their name, each marked.
 """
 
@@ -41,10 +41,10 @@ class FormatConverter(StringConverter):
 
     def to_python(self, value: str) -> Format:  # type: ignore[override]  # Django takes any type
         """The format of this suffix; ValueError, for Django, where there is none."""
-        found = next((each for each in formats.FORMATS if each.suffix == value), None)
-        if found is None:
+        match = next((each for each in formats.FORMATS if each.suffix == value), None)
+        if match is None:
             raise ValueError(value)
-        return found
+        return match
 
 
 @require_safe
@@ -60,8 +60,8 @@ def edition(request: HttpRequest, split: str, number: int, chosen: Format) -> Ht
     """The board of an edition, for ever."""
     if chosen.write is None:
         return _api_document(request, "api-edition-board", split, number)
-    found = get_object_or_404(snapshots.editions(), split=split, number=number)
-    return _answer(request, chosen, chosen.write, split=found.split, edition=found)
+    row = get_object_or_404(snapshots.editions(), split=split, number=number)
+    return _answer(request, chosen, chosen.write, split=row.split, edition=row)
 
 
 def _api_document(request: HttpRequest, name: str, *of: object) -> HttpResponse:
@@ -107,7 +107,7 @@ def _answer(
 
 
 def address(board: Board, query: BoardQuery) -> str:
-    """Where this very table can be found again: at its edition's page, or as of its time."""
+    """Return the lasting address of this table: its edition's page, or the board as of its time."""
     if board.edition is None or query.at is not None:
         path = reverse("board", args=[board.split.pk])
     else:
@@ -131,7 +131,7 @@ def of_method(results: Sequence[Result]) -> dict[str, str]:
 
 
 def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str, Any]:
-    """What a board's page offers to take along: what everybody sees, and for a team its own rows as well.
+    """Return the exports that a board's page offers: the public rows, and for a team its own as well.
 
     All are of the same view: labels, each with its links. `board` is it as the reader sees it.
     """
@@ -146,7 +146,7 @@ def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str
     def links(label: str, about: str, **more: str) -> Iterator[dict[str, Any]]:
         for each in formats.FORMATS:
             if each.has_values or not label:
-                # The API's document has the rows of whoever asks, unless it is asked for without.
+                # The API's document has the rows of the user who asks, unless it is asked for without.
                 public = {"mine": "0"} if has_own and each.write is None and "mine" not in more else {}
                 yield {
                     "format": each,

@@ -1,4 +1,4 @@
-"""What other places show of public rows: the badge of a README, and the feed."""
+"""Public rows on other sites: the badge of a README, and the feed."""
 
 from uuid import UUID
 

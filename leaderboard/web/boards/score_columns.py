@@ -32,7 +32,7 @@ MARKED: Final = "possibly best in its column (95 % confidence)"
 class Heading:
     """A column's head: a link that sorts by it, or turns the order round; and the scale of its whiskers.
 
-    `place` is the class of all cells of its TTC range, by which a narrow screen chooses what it shows.
+    `range_css` is the class of all cells of its TTC range, by which a narrow screen chooses what it shows.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Heading:
     unit: str = ""
     spoken: str = ""
     css: str = ""
-    place: str = ""
+    range_css: str = ""
     metric: str = ""
     axis: SafeString = NOTHING
 
@@ -55,7 +55,7 @@ class Cell:
 
     text: str
     css: str = ""
-    place: str = ""  # as the heading's
+    range_css: str = ""  # as the heading's
     is_best: bool = False
     is_second: bool = False
     is_with_best: bool = False  # possibly best in its column (95 % confidence): its rank range begins at 1
@@ -65,7 +65,7 @@ class Cell:
 
     @property
     def hint(self) -> str:
-        """The interval and the mark, for whoever points at the number."""
+        """The interval and the mark, shown when the pointer is on the number."""
         hints = (
             f"95 % confidence interval: {self.interval}" if self.interval else "",
             MARKED * self.is_with_best,
@@ -88,15 +88,15 @@ class Group:
 
 
 def ends_of(entry: Entry, name: str) -> whiskers.Ends | None:
-    found = entry.intervals.get(name, ConfidenceInterval())
-    return None if found.low is None or found.high is None else (found.low, found.high)
+    interval = entry.intervals.get(name, ConfidenceInterval())
+    return None if interval.low is None or interval.high is None else (interval.low, interval.high)
 
 
 @cache
-def place_of(name: str) -> str:
+def range_css(name: str) -> str:
     """The class of all columns of a score's TTC range, by its number among the ranges of all protocols.
 
-    >>> place_of("mid"), place_of("rte_crucial")
+    >>> range_css("mid"), range_css("rte_crucial")
     ('at0', 'at1')
     """
     return f"at{(OVERALL, *known_ranges()).index(split_name(name)[1])}"
@@ -128,7 +128,7 @@ def score_heading(name: str, query: BoardQuery | None = None, scale: WhiskerScal
         href=sort_href(name, query),
         aria_sort=aria_sort_of(name, query),
         css=column_css(name),
-        place=place_of(name),
+        range_css=range_css(name),
         metric=metric.symbol,
         axis=whiskers.axis(scale) if scale else NOTHING,
     )
@@ -143,17 +143,17 @@ def score_cells(
     """The numbers of a result, all or those of these names, each with its interval where it has one."""
     cells = []
     for name in entry.scores if names is None else names:
-        value, found = entry.scores.get(name), entry.intervals.get(name, ConfidenceInterval())
+        value, interval = entry.scores.get(name), entry.intervals.get(name, ConfidenceInterval())
         scale = scales.get(name)
         cells.append(
             Cell(
                 text=format_rounded(value, decimals=entry.decimals),
                 css=cell_css(name, value, entry.decimals),
-                place=place_of(name),
+                range_css=range_css(name),
                 is_best=name in entry.best,
                 is_second=name in entry.second,
-                is_with_best=found.rank_low == 1,
-                interval=interval_words(found, decimals=entry.decimals),
+                is_with_best=interval.rank_low == 1,
+                interval=interval_words(interval, decimals=entry.decimals),
                 has_room=scale is not None,
                 whisker=whiskers.whisker(scale, value, ends_of(entry, name))
                 if scale and value is not None
@@ -163,17 +163,17 @@ def score_cells(
     return tuple(cells)
 
 
-def interval_words(found: ConfidenceInterval, *, decimals: int = SCORED_DECIMALS) -> str:
-    """From where to where a value may lie; empty where that is not known.
+def interval_words(interval: ConfidenceInterval, *, decimals: int = SCORED_DECIMALS) -> str:
+    """Return an interval in words; empty where it is not known.
 
-    >>> interval_words(Interval(low=13.9, high=14.523)), interval_words(Interval())
+    >>> interval_words(ConfidenceInterval(low=13.9, high=14.523)), interval_words(ConfidenceInterval())
     ('13.90 to 14.52', '')
-    >>> interval_words(Interval(low=13.9, high=14.5), decimals=1)
+    >>> interval_words(ConfidenceInterval(low=13.9, high=14.5), decimals=1)
     '13.9 to 14.5'
     """
-    if found.low is None or found.high is None:
+    if interval.low is None or interval.high is None:
         return ""
-    low, high = (format_rounded(end, decimals=decimals) for end in (found.low, found.high))
+    low, high = (format_rounded(end, decimals=decimals) for end in (interval.low, interval.high))
     return f"{low} to {high}"
 
 
@@ -199,10 +199,10 @@ def column_css(name: str) -> str:
 
 def cell_css(name: str, value: float | None, decimals: int) -> str:
     """The class of a number: its column, and what keeps its point in line."""
-    place = column_css(name)
+    css = column_css(name)
     if value is None:
-        return f"{place} absent"
-    return place if decimals == SCORED_DECIMALS else f"{place} d{decimals}"
+        return f"{css} absent"
+    return css if decimals == SCORED_DECIMALS else f"{css} d{decimals}"
 
 
 def sort_href(name: str, query: BoardQuery | None) -> str:

@@ -27,7 +27,7 @@ from leaderboard.web.boards.score_columns import (
     Heading,
     aria_sort_of,
     ends_of,
-    place_of,
+    range_css,
     score_cells,
     score_groups,
     score_heading,
@@ -65,7 +65,7 @@ class BoardRow:
 
     @property
     def is_hypothetical(self) -> bool:
-        """Whether its rank is one that it would have, if others saw it."""
+        """Whether its rank is the one that it would have if it were public."""
         return self.entry.rank is not None and not self.entry.is_visible_to_all
 
     @property
@@ -81,7 +81,7 @@ class BoardRow:
 
     @property
     def can_be_compared(self) -> bool:
-        """Whether there is something of it to be compared: papers print no values per recording."""
+        """Whether it can be compared: papers print no values per recording."""
         return self.entry.method_id is not None and self.entry.scores[PRIMARY] is not None
 
 
@@ -92,7 +92,7 @@ class BoardTable:
     query: BoardQuery
     text_headings: dict[str, Heading]
     # The ranges that a narrow screen shows one of: class, label, chosen.
-    places: tuple[tuple[str, str, bool], ...]
+    range_choices: tuple[tuple[str, str, bool], ...]
     groups: tuple[Group, ...]
     score_headings: tuple[Heading, ...]
     rows: tuple[BoardRow, ...]
@@ -108,7 +108,7 @@ class BoardTable:
 
     @property
     def has_private_rows(self) -> bool:
-        """Whether the reader's own team has rows here that nobody else sees."""
+        """Whether the reader's team has rows here that it alone sees."""
         return any(not row.entry.is_visible_to_all for row in self.rows)
 
     @property
@@ -156,7 +156,7 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
     return BoardTable(
         query=query,
         text_headings={name: _text_heading(name, query) for name in ("rank", "method", "team", "date")},
-        places=_places(names, query),
+        range_choices=_range_choices(names, query),
         groups=score_groups(names, n_whiskers=len(scales) if is_of_one else 0),
         has_one_whisker=bool(scales) and not is_of_one,
         score_headings=tuple(score_heading(name, query, scales.get(name)) for name in names),
@@ -173,7 +173,7 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
 
 
 def _new_among(entries: Sequence[Entry], *, today: date) -> frozenset[UUID]:
-    """The methods that are new; none where most rows are, of which it would say nothing."""
+    """Return the methods that are new; none where most rows are, since the mark would say nothing."""
     new = frozenset(
         entry.method_id
         for entry in entries
@@ -184,7 +184,7 @@ def _new_among(entries: Sequence[Entry], *, today: date) -> frozenset[UUID]:
 
 
 def _note(entry: Entry, present: Edition | None) -> str:
-    """Why the present edition cannot score a row of a former one; nothing of the file itself is told."""
+    """Return why the present edition cannot score a row of a former one; it reveals nothing of the file."""
     if present is None or not entry.is_unscorable or entry.withdrawn_at:
         return ""
     return _WHY_UNSCORABLE.get(entry.unscorable, "Edition {} cannot score its file.").format(present.number)
@@ -200,7 +200,7 @@ def _reason(board: Board, *, has_intervals: bool) -> str:
 
 def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, WhiskerScale]:
     """One scale for each of these columns that has an interval, the same for all rows of all pages."""
-    found = {}
+    scales = {}
     for name in names:
         values = [(value, entry) for entry in entries if (value := entry.scores[name]) is not None]
         known = [ends for _, entry in values if (ends := ends_of(entry, name)) is not None]
@@ -209,15 +209,15 @@ def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, Whisker
         band = (best[1] or (best[0], best[0])) if best else None
         scale = whiskers.scale_of([value for value, _ in values], known, best=band)
         if scale is not None:
-            found[name] = scale
-    return found
+            scales[name] = scale
+    return scales
 
 
-def _places(names: Sequence[str], query: BoardQuery) -> tuple[tuple[str, str, bool], ...]:
+def _range_choices(names: Sequence[str], query: BoardQuery) -> tuple[tuple[str, str, bool], ...]:
     sorted_by = query.sort.removeprefix("-")
-    chosen = place_of(sorted_by) if sorted_by in names else place_of(PRIMARY)
-    labels = {place_of(name): found.seconds if (found := range_of(name)) else "Overall" for name in names}
-    return tuple((place, label, place == chosen) for place, label in labels.items())
+    chosen = range_css(sorted_by) if sorted_by in names else range_css(PRIMARY)
+    labels = {range_css(name): bounds.seconds if (bounds := range_of(name)) else "Overall" for name in names}
+    return tuple((css, label, css == chosen) for css, label in labels.items())
 
 
 def counted_ranges(rules: Protocol, counts: Mapping[str, int]) -> list[tuple[TTCRange, int | None]]:
@@ -226,13 +226,13 @@ def counted_ranges(rules: Protocol, counts: Mapping[str, int]) -> list[tuple[TTC
 
 
 def rank_range(entry: Entry) -> str:
-    """Where an entry may stand at 95 %, behind its rank; empty where that is not known."""
-    found = entry.intervals.get(PRIMARY, ConfidenceInterval())
-    if found.rank_low is None or found.rank_high is None:
+    """Return the ranks that an entry may have at 95 %, for behind its rank; empty where not known."""
+    interval = entry.intervals.get(PRIMARY, ConfidenceInterval())
+    if interval.rank_low is None or interval.rank_high is None:
         return ""
-    if found.rank_low == found.rank_high:
-        return f"({found.rank_low})"
-    return f"({found.rank_low}–{found.rank_high})"
+    if interval.rank_low == interval.rank_high:
+        return f"({interval.rank_low})"
+    return f"({interval.rank_low}–{interval.rank_high})"
 
 
 def _text_heading(name: str, query: BoardQuery) -> Heading:

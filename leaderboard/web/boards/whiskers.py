@@ -40,16 +40,16 @@ class WhiskerScale:
         return self.low > 0 and self.high > _LOG_FROM * self.low
 
     def percent(self, value: float) -> float:
-        """Where a value stands; what lies beyond an end stands at that end.
+        """Return where a value is drawn; a value beyond an end is drawn at that end.
 
         >>> WhiskerScale(10.0, 20.0).percent(15.0), WhiskerScale(1.0, 100.0).percent(10.0)
         (50.0, 50.0)
         """
-        held = min(self.high, max(self.low, value))
+        clamped = min(self.high, max(self.low, value))
         if self.is_log:
-            share = math.log(held / self.low) / math.log(self.high / self.low)
+            share = math.log(clamped / self.low) / math.log(self.high / self.low)
         else:
-            share = (held - self.low) / (self.high - self.low)
+            share = (clamped - self.low) / (self.high - self.low)
         return round(_MARGIN + (100.0 - 2 * _MARGIN) * share, 1)
 
     def labels(self) -> tuple[float, ...]:
@@ -58,13 +58,13 @@ class WhiskerScale:
         >>> WhiskerScale(9.1, 84.0).labels(), WhiskerScale(11.2, 15.1).labels()
         ((10.0, 20.0, 50.0), (12.0, 14.0))
         """
-        found: list[float] = []
+        labels: list[float] = []
         for value in self._round_numbers():
             at = self.percent(value)
-            is_apart = not found or at - self.percent(found[-1]) >= _LABEL_GAP
+            is_apart = not labels or at - self.percent(labels[-1]) >= _LABEL_GAP
             if is_apart and 6.0 <= at <= 94.0:
-                found.append(value)
-        return tuple(found)
+                labels.append(value)
+        return tuple(labels)
 
     def _round_numbers(self) -> Sequence[float]:
         if not self.is_log:
@@ -89,13 +89,13 @@ def scale_of(values: Iterable[float], intervals: Iterable[Ends], *, best: Ends |
     >>> scale_of([10.0, 11.0, 12.0, 13.0, 900.0], [(9.5, 10.5)], best=(9.5, 10.5))
     WhiskerScale(low=9.5, high=13.0, best=(9.5, 10.5))
     """
-    found, ends = sorted(values), list(intervals)
-    if not found or not ends:
+    ordered, ends = sorted(values), list(intervals)
+    if not ordered or not ends:
         return None
     # A little beyond the last of most: a row that ends close to it is shown as well.
-    limit = _ROOM * found[math.ceil(_MOST * len(found)) - 1]
-    low = min(found[0], *(low for low, _ in ends))
-    high = max(value for value in [*found, *(high for _, high in ends)] if value <= limit)
+    limit = _ROOM * ordered[math.ceil(_MOST * len(ordered)) - 1]
+    low = min(ordered[0], *(low for low, _ in ends))
+    high = max(value for value in [*ordered, *(high for _, high in ends)] if value <= limit)
     return WhiskerScale(low, max(high, low + 1e-9), best)
 
 
@@ -117,9 +117,9 @@ def whisker(scale: WhiskerScale, value: float, ends: Ends | None) -> SafeString:
 
 def axis(scale: WhiskerScale) -> SafeString:
     """The scale itself, for the head of a column: its round numbers over small marks."""
-    places = [(f"{scale.percent(value):g}", f"{value:g}") for value in scale.labels()]
-    marks = format_html_join("", '<line x1="{0}%" x2="{0}%" y1="13" y2="17"/>', ((at,) for at, _ in places))
-    texts = format_html_join("", '<text x="{}%" y="10" text-anchor="middle">{}</text>', places)
+    ticks = [(f"{scale.percent(value):g}", f"{value:g}") for value in scale.labels()]
+    marks = format_html_join("", '<line x1="{0}%" x2="{0}%" y1="13" y2="17"/>', ((at,) for at, _ in ticks))
+    texts = format_html_join("", '<text x="{}%" y="10" text-anchor="middle">{}</text>', ticks)
     return _svg("axis", [marks, texts])
 
 

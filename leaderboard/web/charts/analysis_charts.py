@@ -17,7 +17,7 @@ from leaderboard.web.charts.chart_options import (
     call,
     empty,
     error_axis,
-    places_axis,
+    ticks_axis,
     x_axis,
     y_axis,
 )
@@ -96,8 +96,8 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric]) -> Chart:
 
 def _interval(row: Row, metric: Metric) -> tuple[float, float] | None:
     """The confidence interval of a bin's mean, if it has one."""
-    found = row.get("intervals", {}).get(metric.name)
-    return (found[0], found[1]) if found else None
+    interval = row.get("intervals", {}).get(metric.name)
+    return (interval[0], interval[1]) if interval else None
 
 
 def _ends(bins: Sequence[Row], metric: Metric) -> list[float]:
@@ -105,7 +105,7 @@ def _ends(bins: Sequence[Row], metric: Metric) -> list[float]:
 
 
 def _runs(bins: Sequence[Row]) -> Iterator[list[Row]]:
-    """Bins that touch each other: no line leads over a gap without sequences."""
+    """Yield runs of bins that touch each other, so that no line crosses a gap without sequences."""
     run = [bins[0]]
     for before, row in itertools.pairwise(bins):
         if row["low_s"] != before["high_s"]:
@@ -117,7 +117,7 @@ def _runs(bins: Sequence[Row]) -> Iterator[list[Row]]:
 
 def _curve_series(run: Sequence[Row], metric: Metric, *, grid: int) -> Iterator[Option]:
     middles = [(row["low_s"] + row["high_s"]) / 2 for row in run]
-    found = [
+    points = [
         Mark(
             middle,
             row[metric.name],
@@ -135,8 +135,8 @@ def _curve_series(run: Sequence[Row], metric: Metric, *, grid: int) -> Iterator[
         if (interval := _interval(row, metric)) is not None
     ]
     yield band(SPAN, spans, "--accent", grid=grid)
-    yield line(MEAN, [(mark.x, mark.y) for mark in found], "--accent", grid=grid)
-    yield marks(MEAN, found, Look("--accent", size=5.0), grid=grid) | {"upright": True}
+    yield line(MEAN, [(mark.x, mark.y) for mark in points], "--accent", grid=grid)
+    yield marks(MEAN, points, Look("--accent", size=5.0), grid=grid) | {"upright": True}
 
 
 def _seconds(row: Row) -> str:
@@ -158,16 +158,16 @@ def histogram(bins: Sequence[Row]) -> Chart:
     if not bins:
         return empty("histogram")
     words = [_bin_words(row) for row in bins]
-    found = [
+    bar_marks = [
         Mark(i, row["n"], (f"{MID.symbol} {text}", counted(row["n"], "sequence")))
         for i, (row, text) in enumerate(zip(bins, words, strict=True))
     ]
-    scale = places_axis(_bar_ticks(bins), low=0.0, high=float(len(bins)))
-    places = {"type": "category", "data": list(range(len(bins))), "show": False}
+    scale = ticks_axis(_bar_ticks(bins), low=0.0, high=float(len(bins)))
+    bar_axis = {"type": "category", "data": list(range(len(bins))), "show": False}
     frame = Frame(
-        x_axes=[places],
+        x_axes=[bar_axis],
         y_axes=[y_axis("Sequences", {"type": "value", "min": 0, "minInterval": 1})],
-        series=[bars("Sequences", found, "--accent")],
+        series=[bars("Sequences", bar_marks, "--accent")],
         further_x_axes=[x_axis(f"{MID.title} ({MID.symbol}), {MID.unit}", scale)],
     )
     return Chart(
@@ -203,11 +203,11 @@ def _bar_ticks(bins: Sequence[Row]) -> list[tuple[float, str]]:
 
 
 def scatter(drawn: Mapping[str, Sequence[float]]) -> Chart:
-    """Every pair as a mark beside the line on which the two agree; what lies outside is at the edge."""
+    """Draw every pair as a mark, with the line on which the two agree; outliers are at the edge."""
     pairs = sorted(zip(drawn["true_s"], drawn["predicted_s"], strict=True))
     if not pairs:
         return empty("scatter")
-    found = [
+    points = [
         Mark(
             _clipped(true_s),
             _clipped(predicted_s),
@@ -215,7 +215,7 @@ def scatter(drawn: Mapping[str, Sequence[float]]) -> Chart:
         )
         for true_s, predicted_s in pairs
     ]
-    cloud = marks("Sequences", found, Look("--accent", size=5.0))
+    cloud = marks("Sequences", points, Look("--accent", size=5.0))
     cloud["itemStyle"] = {"color": "--accent", "opacity": 0.6}
     frame = Frame(
         x_axes=[x_axis("True time to contact in s", _TTC_AXIS)],

@@ -48,46 +48,46 @@ class _Placed:
     x: float
     y: float
     entry: Entry
-    place: str  # in words
+    x_text: str
     is_front: bool = False
 
     def mark(self, praise: str) -> Mark:
-        """What is drawn of it, and told."""
+        """Return the mark with the lines that a reader gets."""
         value = error_text(MID, self.y, decimals=self.entry.decimals)
-        read = [self.entry.method, team_of(self.entry), f"{value} {MID.unit}, {self.place}"]
+        read = [self.entry.method, team_of(self.entry), f"{value} {MID.unit}, {self.x_text}"]
         return Mark(
             self.x, self.y, (*read, praise) if self.is_front else tuple(read), method_href(self.entry)
         )
 
 
 def _with_front(placed: Iterable[tuple[float, float, Entry, str]]) -> list[_Placed]:
-    """In the order of their places; on the front is what is better than everything before it."""
-    best, found = math.inf, []
-    for x, y, entry, place in sorted(placed, key=lambda each: each[:2]):
-        found.append(_Placed(x, y, entry, place, is_front=y < best))
+    """Return points by x, then y; on the front is what is better than everything before it."""
+    best, points = math.inf, []
+    for x, y, entry, x_text in sorted(placed, key=lambda each: each[:2]):
+        points.append(_Placed(x, y, entry, x_text, is_front=y < best))
         best = min(best, y)
-    return found
+    return points
 
 
-def _drawn(found: Sequence[_Placed]) -> tuple[list[_Placed], str]:
-    """The front, and of what lies behind it those with the lowest MiD; and what to say of the others."""
-    behind = sorted((each for each in found if not each.is_front), key=lambda each: each.y)
+def _drawn(points: Sequence[_Placed]) -> tuple[list[_Placed], str]:
+    """Return the front, those behind it with the lowest MiD, and a sentence on the points left out."""
+    behind = sorted((each for each in points if not each.is_front), key=lambda each: each.y)
     if len(behind) <= MAX_BEHIND:
-        return list(found), ""
+        return list(points), ""
     left_out = set(map(id, behind[MAX_BEHIND:]))
-    drawn = [each for each in found if id(each) not in left_out]
-    return drawn, f"Shown are the {len(drawn):,} with the lowest MiD, or on the line, of {len(found):,}."
+    drawn = [each for each in points if id(each) not in left_out]
+    return drawn, f"Shown are the {len(drawn):,} with the lowest MiD, or on the line, of {len(points):,}."
 
 
 def _front_series(
-    found: Sequence[_Placed], *, line: str, praise: str, end: float
+    points: Sequence[_Placed], *, line: str, praise: str, end: float
 ) -> tuple[list[Option], list[str]]:
     """The marks of submissions and of rows from papers, the front with its names; and the legend's names."""
-    front = [each for each in found if each.is_front]
+    front = [each for each in points if each.is_front]
     series = [staircase(line, [*((each.x, each.y) for each in front), (end, front[-1].y)])]
     names = [line]
     for kind, name, symbol in (("submission", SUBMITTED, "circle"), ("published", QUOTED, "diamond")):
-        of_kind = [each for each in found if each.entry.kind == kind]
+        of_kind = [each for each in points if each.entry.kind == kind]
         if not of_kind:
             continue
         names.append(name)
@@ -99,16 +99,16 @@ def _front_series(
     return series, names
 
 
-def _value_cells(found: Sequence[_Placed]) -> list[SafeString]:
+def _value_cells(points: Sequence[_Placed]) -> list[SafeString]:
     """Their MiD for a table, as if all had the most decimals: the others keep the room of the missing one."""
-    most = max(each.entry.decimals for each in found)
+    most = max(each.entry.decimals for each in points)
     return [
         format_html(
             '<span class="{}">{}</span>',
             decimals_css(each.entry, most).strip(),
             format_rounded(each.y, decimals=each.entry.decimals),
         )
-        for each in found
+        for each in points
     ]
 
 
@@ -142,24 +142,24 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Char
         (_ms(datetime(year, 7, 1, tzinfo=UTC)), value, entry, str(year)) for entry, value, year in quoted
     ]
     placed += [(_ms(day), value, entry, f"{day:%Y-%m-%d}") for entry, value, day in sent]
-    found, note = _drawn(_with_front(placed))
+    points, note = _drawn(_with_front(placed))
     first, last = _time_range([day for *_, day in sent], [year for *_, year in quoted])
-    series, names = _front_series(found, line="Best so far", praise="the best when it came", end=_ms(last))
+    series, names = _front_series(points, line="Best so far", praise="the best when it came", end=_ms(last))
     frame = Frame(
         x_axes=[x_axis(_time_title(first, last), _time_axis(first, last))],
-        y_axes=[error_axis(MID, [each.y for each in found], room=_ROOM)],
+        y_axes=[error_axis(MID, [each.y for each in points], room=_ROOM)],
         series=series,
         names=names,
         more=ZOOMABLE,
     )
     return Chart(
         kind="progress",
-        label=f"MiD of each method by date, with the lowest MiD so far: {_front_words(found)}.",
+        label=f"MiD of each method by date, with the lowest MiD so far: {_front_words(points)}.",
         options=frame.options(),
         columns=("Date", "Method", "Team", MID.heading, "Best so far"),
         rows=tuple(
-            (each.place, each.entry.method, team_of(each.entry), value, "yes" if each.is_front else "")
-            for each, value in zip(found, _value_cells(found), strict=True)
+            (each.x_text, each.entry.method, team_of(each.entry), value, "yes" if each.is_front else "")
+            for each, value in zip(points, _value_cells(points), strict=True)
         ),
         numbers=(3,),
         is_zoomable=True,
@@ -183,8 +183,8 @@ ZOOMABLE: Final = {
 }
 
 
-def _front_words(found: Sequence[_Placed]) -> str:
-    front = [each for each in found if each.is_front]
+def _front_words(points: Sequence[_Placed]) -> str:
+    front = [each for each in points if each.is_front]
     texts = [f"{each.entry.method} {error_text(MID, each.y, decimals=each.entry.decimals)}" for each in front]
     return texts[0] if len(texts) == 1 else f"from {texts[0]} to {texts[-1]}"
 
@@ -227,7 +227,7 @@ def _time_title(first: datetime, last: datetime) -> str:
 
 def latency(entries: Sequence[Entry]) -> Chart:
     """MiD against latency, of the methods that state one; the front is what nothing beats in both."""
-    found, note = _drawn(
+    points, note = _drawn(
         _with_front(
             (latency_ms, value, entry, f"{latency_ms:g} ms")
             for entry in entries
@@ -236,19 +236,19 @@ def latency(entries: Sequence[Entry]) -> Chart:
             and (value := entry.scores[PRIMARY]) is not None
         )
     )
-    if not found:
+    if not points:
         return empty("latency")
-    axis = log_axis(each.x for each in found)
-    series, names = _front_series(found, line="Pareto front", praise="on the Pareto front", end=axis["max"])
+    axis = log_axis(each.x for each in points)
+    series, names = _front_series(points, line="Pareto front", praise="on the Pareto front", end=axis["max"])
     frame = Frame(
         x_axes=[x_axis("Latency in ms (log scale)", axis)],
-        y_axes=[error_axis(MID, [each.y for each in found], room=_ROOM)],
+        y_axes=[error_axis(MID, [each.y for each in points], room=_ROOM)],
         series=series,
         names=names,
     )
     return Chart(
         kind="latency",
-        label=f"MiD of each method against its latency, with the Pareto front: {_front_words(found)}.",
+        label=f"MiD of each method against its latency, with the Pareto front: {_front_words(points)}.",
         options=frame.options(),
         columns=("Method", "Team", "Latency in ms", "Hardware", MID.heading, "On the Pareto front"),
         rows=tuple(
@@ -260,7 +260,7 @@ def latency(entries: Sequence[Entry]) -> Chart:
                 value,
                 "yes" if each.is_front else "",
             )
-            for each, value in zip(found, _value_cells(found), strict=True)
+            for each, value in zip(points, _value_cells(points), strict=True)
         ),
         numbers=(2, 4),
         note=note,

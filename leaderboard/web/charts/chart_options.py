@@ -1,4 +1,4 @@
-"""Charts as options for Apache ECharts, built from the numbers of the table that stands beside each.
+"""Charts as options for Apache ECharts, built from the numbers of the table next to each.
 
 `static/charts.js` draws them. JSON has neither the page's colours nor functions, so a text such as "--accent"
 is the page's colour of that name, and `call("names", …)` a function of that script. The `read` of a mark are
@@ -49,13 +49,13 @@ class Chart:
         return any("href" in mark for each in series for mark in each["data"])
 
     def __bool__(self) -> bool:
-        """Whether there is anything to be drawn: an empty chart is never shown."""
+        """Whether there is anything to draw: an empty chart is never shown."""
         return bool(self.rows)
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A point of a chart: where it stands, what a reader is told there, and what a click opens."""
+    """A point of a chart: its position, the lines that a reader gets, and the page that a click opens."""
 
     x: float
     y: float
@@ -64,12 +64,12 @@ class Mark:
 
     def item(self) -> Option:
         """The mark as ECharts takes it."""
-        found: Option = {"value": [self.x, self.y], "name": self.read[0], "read": list(self.read[1:])}
-        return found | ({"href": self.href} if self.href else {})
+        option: Option = {"value": [self.x, self.y], "name": self.read[0], "read": list(self.read[1:])}
+        return option | ({"href": self.href} if self.href else {})
 
 
 def empty(kind: str) -> Chart:
-    """A chart of which there is nothing to be drawn."""
+    """Return a chart with nothing to draw."""
     return Chart(kind=kind, label="", options={}, columns=(), rows=())
 
 
@@ -84,7 +84,7 @@ def method_href(entry: Entry) -> str:
 
 
 def error_text(metric: Metric, value: float | None, *, decimals: int) -> str:
-    """A value with its symbol, as a reader is told it.
+    """Return a value with its symbol, as readers see it.
 
     >>> from evaluator.metrics.registry import MID
     >>> error_text(MID, 14.3, decimals=2)
@@ -167,16 +167,16 @@ def _styled(axis: Mapping[str, Any]) -> Option:
     return {**axis, "axisLabel": label, "axisTick": tick}
 
 
-def places_axis(places: Sequence[tuple[float, str]], *, low: float, high: float) -> Option:
-    """An axis with these texts at these places."""
-    at = {"customValues": [place for place, _ in places]}
-    label = {**at, "formatter": call("texts", [list(place) for place in places])}
+def ticks_axis(ticks: Sequence[tuple[float, str]], *, low: float, high: float) -> Option:
+    """Return an axis with ticks at these values, each with its text."""
+    at = {"customValues": [tick for tick, _ in ticks]}
+    label = {**at, "formatter": call("texts", [list(tick) for tick in ticks])}
     return {"type": "value", "min": low, "max": high, "axisLabel": label, "axisTick": at}
 
 
 def names_axis(names: Sequence[str]) -> Option:
-    """An axis on which the i-th name stands at i, so that marks can stand beside it."""
-    return places_axis(list(enumerate(names)), low=-0.5, high=len(names) - 0.5)
+    """Return an axis with the i-th name at i, so that there is room for marks next to it."""
+    return ticks_axis(list(enumerate(names)), low=-0.5, high=len(names) - 0.5)
 
 
 def ranks_axis(names: Sequence[str], *, name: str = "", is_upright: bool = False) -> Option:

@@ -33,31 +33,31 @@ class Look:
         return {"color": self.ink, "borderColor": "--ground", "borderWidth": 1, "opacity": 1}
 
 
-def marks(name: str, found: Iterable[Mark], look: Look, *, grid: int = 0, z: int = 2) -> Option:
+def marks(name: str, points: Iterable[Mark], look: Look, *, grid: int = 0, z: int = 2) -> Option:
     """A series of marks."""
     shape = {"symbol": look.symbol, "symbolSize": look.size, "itemStyle": look.style()}
-    return _read("scatter", name, found) | shape | {"xAxisIndex": grid, "yAxisIndex": grid, "z": z}
+    return _read("scatter", name, points) | shape | {"xAxisIndex": grid, "yAxisIndex": grid, "z": z}
 
 
-def _read(kind: str, name: str, found: Iterable[Mark]) -> Option:
-    """What all series have whose marks are read."""
+def _read(kind: str, name: str, points: Iterable[Mark]) -> Option:
+    """Return what all series have whose marks show lines to a reader."""
     return {
         "type": kind,
         "name": name,
-        "data": [mark.item() for mark in found],
+        "data": [mark.item() for mark in points],
         "emphasis": {"disabled": True},
         "cursor": "inherit",
     }
 
 
 def named_marks(name: str, front: Sequence[Mark], chosen: Iterable[int], look: Look) -> Option:
-    """The chosen marks of a front, by their places in it, each with its name in the empty corner below it.
+    """The chosen marks of a front, by their index in it, each with its name in the empty corner below it.
 
     Where names would overlap, the later mark keeps its own: ECharts prefers larger marks, by a hair here.
     """
-    places = list(chosen)
-    items = [{**front[i].item(), "symbolSize": look.size + 0.01 * i} for i in places]
-    nexts = [[front[i + 1].x, front[i + 1].y] if i + 1 < len(front) else None for i in places]
+    indices = list(chosen)
+    items = [{**front[i].item(), "symbolSize": look.size + 0.01 * i} for i in indices]
+    nexts = [[front[i + 1].x, front[i + 1].y] if i + 1 < len(front) else None for i in indices]
     series = marks(name, (), look, z=4)
     label = {
         **TEXT,
@@ -128,15 +128,15 @@ def _custom(
     }
 
 
-def cells(name: str, found: Iterable[Mark], ink: str) -> Option:
-    """Cells of a heat map, at the places of their column and row."""
-    series = _read("heatmap", name, found)
+def cells(name: str, points: Iterable[Mark], ink: str) -> Option:
+    """Return the cells of a heat map, each at its column and row."""
+    series = _read("heatmap", name, points)
     for item in series["data"]:
         item["value"].append(0)  # ECharts draws no cell without a third value
     return series | {"itemStyle": {"color": ink, "borderColor": "--ground", "borderWidth": 1}}
 
 
-def bars(name: str, found: Iterable[Mark], ink: str) -> Option:
+def bars(name: str, points: Iterable[Mark], ink: str) -> Option:
     """A bar for each mark, read wherever the pointer is above or below its top."""
-    series = _read("bar", name, found)
+    series = _read("bar", name, points)
     return series | {"barCategoryGap": "12%", "itemStyle": {"color": ink}, "upright": True}

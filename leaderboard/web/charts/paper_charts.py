@@ -25,7 +25,7 @@ from leaderboard.web.charts.chart_options import (
     Option,
     empty,
     error_axis,
-    places_axis,
+    ticks_axis,
     x_axis,
 )
 from leaderboard.web.charts.chart_series import SERIES_INKS, SERIES_SYMBOLS, Look, line, marks
@@ -45,7 +45,7 @@ def sweep(shown: PrintedTable) -> Chart:
         return empty("published")
     scores = [name for name in table.columns if name in SCORE_NAMES]
     metrics = list(dict.fromkeys(map(metric_of, scores)))
-    # Lines of one panel are told apart by the method, or by the TTC range where there is one method.
+    # Lines of one panel differ by the method, or by the TTC range where there is one method.
     has_ranges = any(split_name(name)[1] != OVERALL for name in scores)
     lines = [
         (split_name(name)[1] if has_ranges else method_name(of_method[0]), name, of_method)
@@ -55,11 +55,11 @@ def sweep(shown: PrintedTable) -> Chart:
     names = list(dict.fromkeys(legend for legend, *_ in lines))
     settings = sorted({_setting(row) for of_method in rows.values() for row in of_method})
     room = 0.04 * (settings[-1] - settings[0])
-    places = places_axis(
+    setting_axis = ticks_axis(
         [(setting, f"{setting:,g}") for setting in settings], low=settings[0] - room, high=settings[-1] + room
     )
     frame = Frame(
-        x_axes=[x_axis(shown.headings[shown.n_names - 1], places) for _ in metrics],
+        x_axes=[x_axis(shown.headings[shown.n_names - 1], setting_axis) for _ in metrics],
         y_axes=[error_axis(metric, _values(table, metric)) for metric in metrics],
         series=[
             series
@@ -68,7 +68,7 @@ def sweep(shown: PrintedTable) -> Chart:
                 legend,
                 name,
                 [(_setting(row), float(row.values[table.columns.index(name)]), row) for row in of_method],
-                place=names.index(legend) % len(SERIES_INKS),
+                index=names.index(legend) % len(SERIES_INKS),
                 grid=metrics.index(metric_of(name)),
             )
         ],
@@ -89,12 +89,12 @@ def _setting(row: PublishedRow) -> float:
 
 
 def _series(
-    legend: str, name: str, points: Sequence[tuple[float, float, PublishedRow]], *, place: int, grid: int
+    legend: str, name: str, points: Sequence[tuple[float, float, PublishedRow]], *, index: int, grid: int
 ) -> list[Option]:
     """A line and its marks; the mark of the default is larger."""
     metric, ttc_range = metric_of(name), split_name(name)[1]
     named = metric.symbol if ttc_range == OVERALL else f"{metric.symbol} {ttc_range}"
-    found = [
+    setting_marks = [
         Mark(
             x,
             y,
@@ -103,18 +103,16 @@ def _series(
         )
         for x, y, row in points
     ]
-    drawn = marks(legend, found, Look(SERIES_INKS[place], SERIES_SYMBOLS[place], 8.0), grid=grid)
+    drawn = marks(legend, setting_marks, Look(SERIES_INKS[index], SERIES_SYMBOLS[index], 8.0), grid=grid)
     for item, (*_, row) in zip(drawn["data"], points, strict=True):
         if row.is_default:
             item["symbolSize"] = 13.0
-    return [line(legend, [(x, y) for x, y, _ in points], SERIES_INKS[place], grid=grid), drawn]
+    return [line(legend, [(x, y) for x, y, _ in points], SERIES_INKS[index], grid=grid), drawn]
 
 
 def _values(table: PublishedTable, metric: Metric) -> list[float]:
-    columns = [
-        place for place, name in enumerate(table.columns) if name in SCORE_NAMES and metric_of(name) == metric
-    ]
-    return [float(row.values[place]) for row in table.rows for place in columns]
+    columns = [i for i, name in enumerate(table.columns) if name in SCORE_NAMES and metric_of(name) == metric]
+    return [float(row.values[i]) for row in table.rows for i in columns]
 
 
 # A table has no papers of its own to cite, and its document is the API's.

@@ -61,14 +61,14 @@ def profile(entries: Sequence[Entry]) -> Chart:
             )
             for name in shown[0].scores
         ),
-        has_intervals=any(found.low is not None for entry in shown for found in entry.intervals.values()),
+        has_intervals=any(each.low is not None for entry in shown for each in entry.intervals.values()),
     )
 
 
 def _legend_name(k: int, entry: Entry) -> str:
     """A method in the legend, with its rank; its place in the chart where there is none keeps names apart."""
-    place = f"{entry.rank} {rank_range(entry)}".strip() if entry.rank is not None else f"[{k + 1}]"
-    return f"{place}  {entry.method}"
+    rank_text = f"{entry.rank} {rank_range(entry)}".strip() if entry.rank is not None else f"[{k + 1}]"
+    return f"{rank_text}  {entry.method}"
 
 
 def _all_ends(shown: Sequence[Entry], names: Sequence[str]) -> list[float]:
@@ -76,8 +76,8 @@ def _all_ends(shown: Sequence[Entry], names: Sequence[str]) -> list[float]:
         value
         for entry in shown
         for name in names
-        for found in [entry.intervals.get(name, ConfidenceInterval())]
-        for value in (entry.scores[name], found.low, found.high)
+        for interval in [entry.intervals.get(name, ConfidenceInterval())]
+        for value in (entry.scores[name], interval.low, interval.high)
         if value is not None
     ]
 
@@ -85,25 +85,25 @@ def _all_ends(shown: Sequence[Entry], names: Sequence[str]) -> list[float]:
 def _profile_series(
     k: int, entry: Entry, names: Sequence[str], *, n_methods: int, grid: int
 ) -> tuple[Option, Option]:
-    """The marks of one method in one panel, each a little beside its neighbours', and their whiskers."""
+    """Return the marks of one method in one panel, apart from those of others, and their whiskers."""
     step = min(0.16, 0.7 / n_methods)
     offset = step * (k - (n_methods - 1) / 2)
-    places = [
+    points = [
         (i + offset, value, name) for i, name in enumerate(names) if (value := entry.scores[name]) is not None
     ]
-    found = [
+    profile_marks = [
         Mark(x, value, (entry.method, f"{_named(name)}: {_value_words(entry, name)}"), method_href(entry))
-        for x, value, name in places
+        for x, value, name in points
     ]
     spans = [
         (x, interval.low, interval.high)
-        for x, _, name in places
+        for x, _, name in points
         for interval in [entry.intervals.get(name, ConfidenceInterval())]
         if interval.low is not None and interval.high is not None
     ]
     legend = _legend_name(k, entry)
     look = Look(SERIES_INKS[k], SERIES_SYMBOLS[k], 9.0)
-    return marks(legend, found, look, grid=grid), whiskers(legend, spans, SERIES_INKS[k], grid=grid)
+    return marks(legend, profile_marks, look, grid=grid), whiskers(legend, spans, SERIES_INKS[k], grid=grid)
 
 
 def _range_words(name: str) -> str:
@@ -122,7 +122,7 @@ def _value_words(entry: Entry, name: str) -> str:
 
 
 def _profile_cell(entry: Entry, name: str, css: str, most: int) -> SafeString:
-    """A value with its interval for a table; `css` gives what stands before the interval its width."""
+    """A value with its interval for a table; `css` gives the text before the interval its width."""
     words = interval_words(entry.intervals.get(name, ConfidenceInterval()), decimals=entry.decimals)
     return format_html(
         '<span class="{}{}">{}</span>{}',

@@ -37,30 +37,30 @@ class _Cell:
     split: str
 
     @property
-    def found(self) -> Difference | None:
+    def mid_difference(self) -> Difference | None:
         """The difference in MiD; None until a worker has computed it."""
         return (self.pair.differences or {}).get(PRIMARY)
 
     @property
     def verdict(self) -> str:
         """The class of its p-value, or why there is none."""
-        if self.found is None or self.found.p_below is None:
+        if self.mid_difference is None or self.mid_difference.p_below is None:
             return UNKNOWN
-        return SIGNIFICANT.get(self.found.p_below, UNDECIDED)
+        return SIGNIFICANT.get(self.mid_difference.p_below, UNDECIDED)
 
     def texts(self) -> tuple[str, str, str]:
         """The difference, its confidence interval and p."""
-        if self.found is None:
+        if self.mid_difference is None:
             return "being computed", "", ""
         decimals = self.pair.first.decimals
-        difference = signed(self.found.difference, decimals=decimals)
-        if self.found.low is None or self.found.high is None:
+        difference = signed(self.mid_difference.difference, decimals=decimals)
+        if self.mid_difference.low is None or self.mid_difference.high is None:
             return difference, "", "not compared"
-        ends = (signed(end, decimals=decimals) for end in (self.found.low, self.found.high))
-        return difference, " to ".join(ends), p_cell(self.found.p, self.found.p_below)
+        ends = (signed(end, decimals=decimals) for end in (self.mid_difference.low, self.mid_difference.high))
+        return difference, " to ".join(ends), p_cell(self.mid_difference.p, self.mid_difference.p_below)
 
     def mark(self) -> Mark:
-        """What is drawn of it, and told."""
+        """Return the mark with the lines that a reader gets."""
         difference, interval, p = self.texts()
         first, second = self.pair.first, self.pair.second
         words = f"{MID.symbol} {difference}" + (f" ({interval})" if interval else "")
@@ -75,15 +75,15 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
     if not pairs:
         return empty("significance")
     entries = _entries(pairs)
-    place = {entry.method_id: i for i, entry in enumerate(entries)}
-    found = [
-        _Cell(place[pair.second.method_id] - 1, place[pair.first.method_id], pair, split) for pair in pairs
+    index = {entry.method_id: i for i, entry in enumerate(entries)}
+    pair_cells = [
+        _Cell(index[pair.second.method_id] - 1, index[pair.first.method_id], pair, split) for pair in pairs
     ]
-    verdicts = [name for name in _INKS if any(cell.verdict == name for cell in found)]
+    verdicts = [name for name in _INKS if any(cell.verdict == name for cell in pair_cells)]
     frame = Frame(
         x_axes=[ranks_axis([str(entry.rank) for entry in entries[1:]], name="Rank of the other method")],
         y_axes=[ranks_axis([_named(entry) for entry in entries[:-1]], is_upright=True)],
-        series=[_series(name, [cell for cell in found if cell.verdict == name]) for name in verdicts],
+        series=[_series(name, [cell for cell in pair_cells if cell.verdict == name]) for name in verdicts],
         names=verdicts,
         left=(220, 120),
         top=30,
@@ -93,14 +93,14 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
         label=f"Pairs of the first {len(entries)} methods by the p-value of their difference in MiD.",
         options=frame.options(),
         columns=("Method", "Compared with", f"Difference in {MID.symbol}", "95 % confidence interval", "p"),
-        rows=tuple((_named(cell.pair.first), _named(cell.pair.second), *cell.texts()) for cell in found),
+        rows=tuple((_named(cell.pair.first), _named(cell.pair.second), *cell.texts()) for cell in pair_cells),
         numbers=(2, 4),
         is_low=len(entries) <= _FEW,
     )
 
 
-def _series(name: str, found: Sequence[_Cell]) -> Option:
-    return cells(name, [cell.mark() for cell in found], _INKS[name])
+def _series(name: str, pair_cells: Sequence[_Cell]) -> Option:
+    return cells(name, [cell.mark() for cell in pair_cells], _INKS[name])
 
 
 def _entries(pairs: Sequence[Pair]) -> list[Entry]:

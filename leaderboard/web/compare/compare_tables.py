@@ -25,7 +25,7 @@ _NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
 
 
 def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, Any]:
-    """What was compared, as the compare page places it; `n_tried` are scored submissions by method."""
+    """Return a comparison for the compare page; `n_tried` are scored submissions by method."""
     return {
         "compared": compared,
         "verdict": verdict(compared),
@@ -38,7 +38,7 @@ def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, 
 
 
 def verdict(compared: Compared) -> str:
-    """What came out, in words: a sentence for two; for more the best, and what it is better than.
+    """Return the outcome in words: a sentence for two; for more the best, and what it is better than.
 
     Empty while a worker still computes it.
     """
@@ -48,7 +48,7 @@ def verdict(compared: Compared) -> str:
         return compared.pairs[0].sentence()
     best = min(compared.entries, key=lambda entry: entry.scores[PRIMARY] or 0.0)
     tested = [pair for pair in compared.pairs if not pair.withheld and PRIMARY in (pair.differences or {})]
-    worse, alike = _told_apart(best, tested)
+    worse, alike = _worse_and_alike(best, tested)
     head = (
         f"Of these {_NUMBERS[len(compared.entries)]}, {best.method} has the lowest MiD, "
         f"{format_rounded(best.scores[PRIMARY], decimals=best.decimals)}."
@@ -59,16 +59,16 @@ def verdict(compared: Compared) -> str:
     relations = (("significantly better than", worse), ("not significantly better than", alike))
     parts = [f"{relation} {get_text_list(names, 'and')}" for relation, names in relations if names]
     together = f", with all {len(tested)} pairs tested together," if len(tested) > 1 else ""
-    said = [head, f"On these recordings{together} it is {', and '.join(parts)}."] if parts else [head]
-    return " ".join([*said, *dict.fromkeys(pair.withheld for pair in compared.pairs if pair.withheld)])
+    lines = [head, f"On these recordings{together} it is {', and '.join(parts)}."] if parts else [head]
+    return " ".join([*lines, *dict.fromkeys(pair.withheld for pair in compared.pairs if pair.withheld)])
 
 
-def _told_apart(best: Entry, tested: Sequence[Pair]) -> tuple[list[str], list[str]]:
+def _worse_and_alike(best: Entry, tested: Sequence[Pair]) -> tuple[list[str], list[str]]:
     """The methods that the best is significantly better than in MiD, and the others.
 
     The best was chosen by looking, so all pairs are tested together. What the board says of the same methods
-    holds first: nothing is worse that it marks as possibly the best, and ranks whose ranges do not meet are
-    told apart.
+    holds first: nothing is worse that it marks as possibly the best, and ranks whose ranges do not meet
+    differ.
     """
     apart = significant_together([(pair.differences or {})[PRIMARY] for pair in tested])
     worse: list[str] = []
@@ -99,15 +99,15 @@ def _pair_table(pair: Pair) -> dict[str, Any]:
         ]
         if differences
         else [],
-        "has_intervals": any(found.low is not None for found in differences.values()),
+        "has_intervals": any(difference.low is not None for difference in differences.values()),
     }
 
 
 def _difference_group(
     group: Group, names: Sequence[str], pair: Pair, differences: Mapping[str, Difference]
 ) -> dict[str, Any]:
-    found = [differences[name] for name in names]
-    ends = [end for each in found for end in (each.low, each.high, each.difference) if end is not None]
+    of_group = [differences[name] for name in names]
+    ends = [end for each in of_group for end in (each.low, each.high, each.difference) if end is not None]
     scale_end = svg.scale_end(ends)
     # Both ends as wide as the widest, so that points stand in line.
     css = figure_css(signed(end, decimals=pair.first.decimals) for end in ends)
@@ -115,24 +115,28 @@ def _difference_group(
     return {"group": group, "axis": svg.axis(scale_end), "rows": rows}
 
 
-def _difference_row(name: str, pair: Pair, found: Difference, scale_end: float, css: str) -> dict[str, Any]:
+def _difference_row(
+    name: str, pair: Pair, difference: Difference, scale_end: float, css: str
+) -> dict[str, Any]:
     decimals = pair.first.decimals  # both are of one edition
     return {
         "heading": score_heading(name),
         "first": format_rounded(pair.first.scores[name], decimals=decimals),
         "second": format_rounded(pair.second.scores[name], decimals=decimals),
-        "difference": signed(found.difference, decimals=decimals),
+        "difference": signed(difference.difference, decimals=decimals),
         "interval": ""
-        if found.low is None or found.high is None
+        if difference.low is None or difference.high is None
         else format_html(
             '<span class="{css}">{}</span> to <span class="{css}">{}</span>',
-            signed(found.low, decimals=decimals),
-            signed(found.high, decimals=decimals),
+            signed(difference.low, decimals=decimals),
+            signed(difference.high, decimals=decimals),
             css=css,
         ),
-        "p": p_cell(found.p, found.p_below),
+        "p": p_cell(difference.p, difference.p_below),
         # why there is neither interval nor p
-        "reason": "" if found.p_below is not None else too_few_units(found.n_effective, unit=found.unit),
-        "is_significant": found.is_significant,
-        "drawn": svg.difference(scale_end, found.difference, found.low, found.high),
+        "reason": ""
+        if difference.p_below is not None
+        else too_few_units(difference.n_effective, unit=difference.unit),
+        "is_significant": difference.is_significant,
+        "drawn": svg.difference(scale_end, difference.difference, difference.low, difference.high),
     }

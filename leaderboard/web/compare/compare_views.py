@@ -16,7 +16,7 @@ from leaderboard.statistics import comparisons, questions
 from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.compare import compare_tables
 
-NOT_FOUND, UNPROCESSABLE, TOO_MANY = 404, 400, 429
+UNKNOWN, BAD_REQUEST, TOO_MANY = 404, 400, 429
 # What the page offers to choose from; the board itself offers all.
 MAX_OFFERED = 50
 
@@ -67,7 +67,7 @@ def _drawn(request: HttpRequest, compared: comparisons.Compared) -> HttpResponse
 
 
 def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None) -> dict[str, object]:
-    """What can be compared on this board, the best first."""
+    """Return the methods that can be compared on this board, the best first."""
     board = snapshots.board(split=split, viewer=request.user)
     entries = [entry for entry in board.entries if entry.method_id and entry.scores["mid"] is not None]
     # A method's page asks for the choice of others beside it.
@@ -88,7 +88,7 @@ def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None
 def _refused(
     request: HttpRequest, split: Split | None, refusal: comparisons.BadComparison | questions.AskedTooOften
 ) -> HttpResponse:
-    status = NOT_FOUND if isinstance(refusal, UnknownSplit | comparisons.UnknownMethod) else UNPROCESSABLE
+    status = UNKNOWN if isinstance(refusal, UnknownSplit | comparisons.UnknownMethod) else BAD_REQUEST
     context = _choice(request, split, refusal) if split else {"refusal": refusal}
     response = render(request, "compare/choose.html", context, status=status)
     if isinstance(refusal, questions.AskedTooOften):

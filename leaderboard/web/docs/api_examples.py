@@ -70,7 +70,7 @@ class Example:
     by: str = "owner"  # who asks: "maintainer" has a token of theirs
 
     def script(self, site: str) -> str:
-        """The Python that runs as it stands; empty where there is none."""
+        """Return the Python to run; empty where there is none."""
         if not self.python:
             return ""
         token = ', token=os.environ["TSTTC_TOKEN"]' if self.call.has_token else ""
@@ -214,7 +214,7 @@ EXAMPLES: Final[Mapping[str, Example]] = {
 
 
 def shown(operation_id: str) -> dict[str, Any]:
-    """What the page of an operation shows: the requests as commands, and their answers."""
+    """Return the examples of an operation for its page: the requests as commands, and their answers."""
     example, recorded = EXAMPLES[operation_id], json.loads(_ANSWERS.read_text(encoding="utf-8"))[operation_id]
     return {
         "curl": example.call.curl(settings.SITE_URL),

@@ -21,7 +21,7 @@ _BARE_CHOICE: Final = re.compile(r"^\* `([^`]+)` - \1$", re.MULTILINE)
 
 @cache
 def reference() -> Node:
-    """What `api_reference.html` shows; the schema cannot change while the process lives."""
+    """Return the context of `api_reference.html`, cached: the schema is constant in a process."""
     schema = SchemaGenerator().get_schema(request=None, public=True)
     named = schema["components"]["schemas"]
     schemas = _inline_enums(named, named)
@@ -85,7 +85,7 @@ def _object(name: str, node: Node) -> Node:
 
 def _objects_in(node: Any, schemas: Node) -> list[str]:
     """The names of the objects that the answers of an operation consist of, in the order of their mention."""
-    found: list[str] = []
+    names: list[str] = []
     waiting = [node["responses"]]
     while waiting:
         each = waiting.pop(0)
@@ -93,11 +93,11 @@ def _objects_in(node: Any, schemas: Node) -> list[str]:
             waiting[:0] = each
         elif isinstance(each, dict):
             name = _target(each) if "$ref" in each else ""
-            if name in schemas and name not in found:
-                found.append(name)
+            if name in schemas and name not in names:
+                names.append(name)
                 waiting.append(schemas[name])
             waiting[:0] = [value for value in each.values() if isinstance(value, dict | list)]
-    return found
+    return names
 
 
 def _fields(node: Node) -> list[Node]:

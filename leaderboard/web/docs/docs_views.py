@@ -48,7 +48,7 @@ def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
 @gzip_page
 @require_safe
 def find(request: HttpRequest) -> HttpResponse:
-    """What the documentation says about some words."""
+    """Show the search in the documentation."""
     query = " ".join(request.GET.get("q", "").replace("\x00", " ").split())[: search.MAX_QUERY]
     hits = search.find(query) if query else []
     context = {"navigation": guides.navigation(), "query": query, "hits": hits}

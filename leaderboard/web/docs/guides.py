@@ -71,12 +71,12 @@ class GuideLink:
 @cache
 def files() -> dict[str, Path]:
     """Every guide by its name in addresses."""
-    found = {
+    paths = {
         _NAMES.get(name, name): path
         for path in (*_DOCS.glob("*.md"), *_DOCS.glob("adr/*.md"))
         for name in [path.relative_to(_DOCS).with_suffix("").as_posix()]
     }
-    return {**found, "examples": _EXAMPLES / "README.md", "changelog": _REPOSITORY / "CHANGELOG.md"}
+    return {**paths, "examples": _EXAMPLES / "README.md", "changelog": _REPOSITORY / "CHANGELOG.md"}
 
 
 @cache
@@ -86,7 +86,7 @@ def _names() -> dict[Path, str]:
 
 @cache
 def navigation() -> list[tuple[str, list[GuideLink]]]:
-    """The side of every page of the documentation: links below titles, of which the first is empty."""
+    """Return the side of every page of the documentation: links below titles, the first title empty."""
     first = [
         GuideLink("At a glance", reverse("docs")),
         GuideLink("Install", reverse("dist")),
@@ -124,14 +124,14 @@ def guide(name: str) -> Document:
 
 
 def _link(address: str, *, source: Path) -> str:
-    """Where a link in a file leads on the site. Raises `DeadLink`."""
+    """Return the address on the site that a link in a file leads to. Raises `DeadLink`."""
     parts = urlsplit(address)
     if parts.scheme in _SCHEMES or address.startswith("#"):
         return address
     target = (source.parent / parts.path).resolve()
-    place = f"#{parts.fragment}" if parts.fragment else ""
+    anchor = f"#{parts.fragment}" if parts.fragment else ""
     if target in _names():
-        return reverse("guide", args=[_names()[target]]) + place
+        return reverse("guide", args=[_names()[target]]) + anchor
     if target.is_relative_to(_EXAMPLES) and target.is_file():
         return static(f"examples/{target.relative_to(_EXAMPLES).as_posix()}")
     raise DeadLink(f"{source.relative_to(_REPOSITORY)} links to {address}; expected a guide or an example")

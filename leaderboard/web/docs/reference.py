@@ -39,7 +39,7 @@ def example_split(splits: Sequence[Split], *, now: datetime) -> Split | None:
 
 
 def docs(splits: Sequence[Split], *, now: datetime) -> dict[str, Any]:
-    """What `docs.html` needs."""
+    """Return the context of `docs.html`."""
     example = example_split(splits, now=now)
     protocol = get_protocol(DEFAULT_PROTOCOL)
     return {

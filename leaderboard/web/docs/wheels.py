@@ -18,7 +18,7 @@ def paths() -> list[Path]:
 
 
 def current() -> dict[str, Any] | None:
-    """What pages tell of the wheel that was built last; None where there is none."""
+    """Return what pages show of the wheel that was built last; None where there is none."""
     path = max(paths(), key=lambda each: each.stat().st_mtime_ns, default=None)
     if path is None:
         return None

@@ -35,7 +35,7 @@ _NOT_FOR_CRAWLERS: Final = (
 
 @require_safe
 def robots(request: HttpRequest) -> HttpResponse:
-    """What crawlers need not look at."""
+    """Return robots.txt: the pages that crawlers leave alone."""
     lines = [
         "User-agent: *",
         *(f"Disallow: {path}" for path in _NOT_FOR_CRAWLERS),
@@ -59,8 +59,8 @@ def sitemap(request: HttpRequest) -> HttpResponse:
         *(_absolute("guide", name) for name in guides.files()),
         *(_absolute("api_operation", name) for name in api_examples.EXAMPLES),
     ]
-    found = [*((address, None) for address in fixed), *_of_boards(splits_of(request))]
-    return HttpResponse(feeds.sitemap(found), content_type="application/xml; charset=utf-8")
+    addresses = [*((address, None) for address in fixed), *_of_boards(splits_of(request))]
+    return HttpResponse(feeds.sitemap(addresses), content_type="application/xml; charset=utf-8")
 
 
 def _of_boards(splits: Sequence[Split]) -> Iterator[tuple[str, datetime | None]]:

@@ -44,7 +44,7 @@ def home(request: HttpRequest) -> HttpResponse:
 
 @require_safe
 def main_board(request: HttpRequest) -> HttpResponse:
-    """To the main board, as the address asks for it."""
+    """Redirect to the main board with the query of the address."""
     main = main_split(splits_of(request))
     if main is None:
         raise Http404("There is no board yet.")
@@ -71,7 +71,7 @@ def _dates(
 
 
 def _leading(main: Split) -> dict[str, Any]:
-    """What the page tells of the main board: only what everybody sees, whoever reads."""
+    """Return what the page shows of the main board: for every reader only what everybody sees."""
     board = snapshots.board(split=main, viewer=AnonymousUser())
     progress = chart_views.progress(board)
     return {

@@ -41,7 +41,7 @@ def _ranked(board: Board) -> list[Entry]:
 
 
 def lead_words(board: Board) -> str:
-    """Whether the lead is certain, from the rank ranges of the board's rows; empty where nobody leads.
+    """Say in a sentence how certain the lead is, by the rows' rank ranges; empty for fewer than two rows.
 
     A rank range holds the ranks that a row may have at 95 % confidence for all rows together.
     """
@@ -52,18 +52,18 @@ def lead_words(board: Board) -> str:
     if len(first) > 1:
         return f"{_listed([entry.method for entry in first])} share the first rank."
     (leader,) = first
-    found = leader.intervals.get(PRIMARY, ConfidenceInterval())
-    if found.rank_low is None or found.rank_high is None:
+    interval = leader.intervals.get(PRIMARY, ConfidenceInterval())
+    if interval.rank_low is None or interval.rank_high is None:
         return (
             f"It is not known whether the lead of {leader.method} is certain: {_why_unknown(board, leader)}"
         )
-    if found.rank_high == 1:
+    if interval.rank_high == 1:
         return f"The lead of {leader.method} is certain: at 95 % confidence its rank is 1."
     also = [e.method for e in ranked[1:] if e.intervals.get(PRIMARY, ConfidenceInterval()).rank_low == 1]
     others = f" {_listed(also)} may also be first." if also else ""
     return (
         f"The lead of {leader.method} is not certain: at 95 % confidence its rank is "
-        f"{found.rank_low} to {found.rank_high}.{others}"
+        f"{interval.rank_low} to {interval.rank_high}.{others}"
     )
 
 

@@ -1,4 +1,4 @@
-"""What happened last, on all boards: editions that were published or rolled back, and new entries."""
+"""The latest news of all boards: editions that were published or rolled back, and new entries."""
 
 from collections.abc import Iterator, Sequence
 from datetime import datetime

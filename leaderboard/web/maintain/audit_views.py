@@ -68,13 +68,13 @@ DIGEST: Final = re.compile(r"(sha256:[0-9a-f]{8})[0-9a-f]{56}")
 @maintainers_only
 @require_safe
 def events(request: HttpRequest) -> HttpResponse:
-    """Who did what to what, the newest first."""
+    """List the audit events that fit the filter, the newest first."""
     asked = AuditFilter(request.GET)
     if not asked.is_valid():
         return render(request, "maintain/audit.html", {"form": asked}, status=400)
     page = Paginator(audit.events(**asked.wanted()), PER_PAGE).get_page(request.GET.get("page"))
     names = audit.names_in(page)
-    rows = [(event, _told(event, names)) for event in page]
+    rows = [(event, _readable_details(event, names)) for event in page]
     context = {"form": asked, "page": page, "query": asked.query(), "rows": rows}
     return render(request, "maintain/audit.html", context)
 
@@ -93,13 +93,13 @@ def export(request: HttpRequest) -> HttpResponse | StreamingHttpResponse:
     )
 
 
-def _told(event: AuditEvent, names: Mapping[str, str]) -> list[tuple[str, str]]:
-    """The details as a person reads them: digests by their beginning, and nothing of what is empty."""
-    told = {
+def _readable_details(event: AuditEvent, names: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Return the details for a reader: digests by their beginning, and no empty values."""
+    details = {
         name: ", ".join(map(str, value)) if isinstance(value, list) else value
         for name, value in event.details.items()
     } | {name: text or "(blanked)" for name, text in _named(event, names).items()}
-    return [(name, DIGEST.sub(r"\1…", str(value))) for name, value in told.items() if value not in ("", None)]
+    return [(name, DIGEST.sub(r"\1…", str(text))) for name, text in details.items() if text not in ("", None)]
 
 
 def _rows(asked: AuditFilter) -> Iterator[dict[str, Any]]:

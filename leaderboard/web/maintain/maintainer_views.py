@@ -61,7 +61,7 @@ def maintainers_form(view: View) -> View:
 @maintainers_only
 @require_safe
 def hub(request: HttpRequest) -> HttpResponse:
-    """What else there is to look after, and every split: its board, what is being prepared, what failed."""
+    """Show the maintainers' overview: every split with its board, editions in preparation and failures."""
     splits = Split.objects.select_related("published_edition__ground_truth")
     desks = [
         (desk, [edition_tables.running(*each) for each in desk["in_preparation"]])
@@ -82,37 +82,37 @@ def hub(request: HttpRequest) -> HttpResponse:
 @maintainers_form
 def open_edition(request: HttpRequest, split: str) -> HttpResponse:
     """Open a draft edition and queue every active submission for it."""
-    found = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
-    form = OpenForm.asked(request, split=found)
+    split_row = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
+    form = OpenForm.asked(request, split=split_row)
     if form.is_valid():
         with form.refusals():
             opened = corrections.open_edition(
                 split_name=split, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
             )
             return redirect("maintain_edition", split, opened.number)
-    choices = edition_tables.truth_choices(found, form.truths)
-    return form_page(request, "maintain/open.html", form, split=found, choices=choices)
+    choices = edition_tables.truth_choices(split_row, form.truths)
+    return form_page(request, "maintain/open.html", form, split=split_row, choices=choices)
 
 
 @maintainers_only
 @require_safe
 def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    """What publishing an edition would change, and how far its re-scoring is."""
-    found = _edition(split, number)
-    context = {**_comparison(found), "predecessor": corrections.predecessor(found.split)}
+    """Show what publishing an edition would change, and how far its re-scoring is."""
+    row = _edition(split, number)
+    context = {**_comparison(row), "predecessor": corrections.predecessor(row.split)}
     return render(request, "maintain/edition.html", context)
 
 
 @maintainers_only
 @require_safe
 def edition_progress(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    found = _edition(split, number)
-    running = edition_tables.running(found, corrections.progress(found))
+    row = _edition(split, number)
+    running = edition_tables.running(row, corrections.progress(row))
     if request.GET.get("seen") == running["seen"] and not running["is_final"]:
         return HttpResponse(status=204)
     context: dict[str, Any] = {"running": running}
     if running["is_final"] and "comparison" in request.GET:
-        context |= _comparison(found)
+        context |= _comparison(row)
     status = STOP_POLLING if running["is_final"] else 200
     return render(request, "maintain/progress_state.html", context, status=status)
 
@@ -120,9 +120,9 @@ def edition_progress(request: HttpRequest, split: str, number: int) -> HttpRespo
 @maintainers_only
 @require_safe
 def preview_csv(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    found = preview.preview(_edition(split, number))
+    compared = preview.preview(_edition(split, number))
     return HttpResponse(
-        "".join(csv_lines(preview.rows(found), columns=found.columns)),
+        "".join(csv_lines(preview.rows(compared), columns=compared.columns)),
         content_type="text/csv; charset=utf-8",
         headers={"Content-Disposition": f'attachment; filename="tsttc-{split}-edition-{number}-preview.csv"'},
     )
@@ -131,26 +131,26 @@ def preview_csv(request: HttpRequest, split: str, number: int) -> HttpResponse:
 @maintainers_form
 def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """Make an edition the board."""
-    found = _edition(split, number)
-    context = _comparison(found)
+    row = _edition(split, number)
+    context = _comparison(row)
     form = PublishForm.asked(request, initial={"replaces": context["preview"].replaces})
     if form.is_valid():
         with form.refusals():
             corrections.publish(
-                edition=found, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
+                edition=row, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
             )
             messages.success(request, f"Edition {number} is now the board of {split}.")
             return redirect("board", split)
     return form_page(
-        request, "maintain/publish.html", form, unfinished=corrections.unfinished(found), **context
+        request, "maintain/publish.html", form, unfinished=corrections.unfinished(row), **context
     )
 
 
 @maintainers_form
 def roll_back(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """Make the edition that this one replaced the board again."""
-    found = _edition(split, number)
-    former = corrections.predecessor(found.split)
+    row = _edition(split, number)
+    former = corrections.predecessor(row.split)
     form = RollBackForm.asked(request, initial={"replaces": number})
     if form.is_valid():
         with form.refusals():
@@ -161,23 +161,23 @@ def roll_back(request: HttpRequest, split: str, number: int) -> HttpResponse:
                 request, f"Edition {number} was rolled back; the board of {split} is the one before it."
             )
             return redirect("board", split)
-    context = {**_comparison(former), "undone": edition_tables.change_words(former, found)} if former else {}
-    return form_page(request, "maintain/roll_back.html", form, leaving=found, former=former, **context)
+    context = {**_comparison(former), "undone": edition_tables.change_words(former, row)} if former else {}
+    return form_page(request, "maintain/roll_back.html", form, leaving=row, former=former, **context)
 
 
 @maintainers_form
 def discard(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """Give up an edition in preparation."""
-    found = _edition(split, number)
+    row = _edition(split, number)
     form = DiscardForm.asked(request)
     if form.is_valid():
         with form.refusals():
             corrections.discard(
-                edition=found, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
+                edition=row, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
             )
             messages.success(request, f"Edition {number} of {split} was discarded.")
             return redirect("maintain")
-    return form_page(request, "maintain/discard.html", form, **_comparison(found))
+    return form_page(request, "maintain/discard.html", form, **_comparison(row))
 
 
 def maintainer_of(request: HttpRequest) -> User:
@@ -189,13 +189,13 @@ def _edition(split: str, number: int) -> Edition:
     return get_object_or_404(rows, split=split, number=number)
 
 
-def _comparison(found: Edition) -> dict[str, Any]:
-    compared = preview.preview(found)
+def _comparison(row: Edition) -> dict[str, Any]:
+    compared = preview.preview(row)
     return {
-        "edition": found,
+        "edition": row,
         "preview": compared,
         "table": edition_tables.change_table(compared),
-        "running": edition_tables.running(found, compared.progress),
+        "running": edition_tables.running(row, compared.progress),
     }
 
 

@@ -81,22 +81,22 @@ class Action:
     do: Callable[..., object]
 
 
-def _move(*, subject: Method, name: str, now: object, **told: Any) -> None:
+def _move(*, subject: Method, name: str, now: object, **arguments: Any) -> None:
     by_id = Q(pk=parse_uuid(name)) if parse_uuid(name) else Q()
-    found = list(Team.objects.filter(Q(name=name) | by_id)[:2]) if name else []
-    if len(found) != 1:
-        how = "Several teams are" if found else "No team is"
+    matches = list(Team.objects.filter(Q(name=name) | by_id)[:2]) if name else []
+    if len(matches) != 1:
+        how = "Several teams are" if matches else "No team is"
         raise Refused(
             "bad-value", f"{how} called {name!r}; expected the name or the id of one team.", field="name"
         )
-    hiding.move_method(method=subject, to=found[0], **told)
+    hiding.move_method(method=subject, to=matches[0], **arguments)
 
 
-def _appoint(*, subject: User, now: object, **told: Any) -> None:
+def _appoint(*, subject: User, now: object, **arguments: Any) -> None:
     team = _team_of(subject)
     if team is None:
         raise Refused("bad-value", "The person is in no team; expected a member of a team.")
-    teams.appoint(team=team, to=subject, **told)
+    teams.appoint(team=team, to=subject, **arguments)
 
 
 ACTIONS: Final[Mapping[str, Action]] = {
@@ -106,7 +106,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         _RENAMED,
         "Rename",
         RenameForm,
-        lambda subject, **told: hiding.rename_team(team=subject, **told),
+        lambda subject, **arguments: hiding.rename_team(team=subject, **arguments),
     ),
     "rename-method": Action(
         Method,
@@ -114,7 +114,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         _RENAMED,
         "Rename",
         RenameForm,
-        lambda subject, **told: hiding.rename_method(method=subject, **told),
+        lambda subject, **arguments: hiding.rename_method(method=subject, **arguments),
     ),
     "clear-texts": Action(
         Method,
@@ -122,7 +122,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Description, paper link and code link are deleted. The team can write new ones.",
         "Delete texts",
         ActionForm,
-        lambda subject, now, **told: hiding.clear_texts(method=subject, **told),
+        lambda subject, now, **arguments: hiding.clear_texts(method=subject, **arguments),
     ),
     "move-method": Action(
         Method,
@@ -138,7 +138,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Its values leave the board; its row stays, marked with the date. This cannot be undone.",
         "Withdraw",
         ActionForm,
-        lambda subject, **told: hiding.withdraw_entry(submission=subject, is_hidden=False, **told),
+        lambda subject, **arguments: hiding.withdraw_entry(submission=subject, is_hidden=False, **arguments),
     ),
     "hide": Action(
         Submission,
@@ -147,7 +147,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "This cannot be undone.",
         "Hide",
         ActionForm,
-        lambda subject, **told: hiding.withdraw_entry(submission=subject, is_hidden=True, **told),
+        lambda subject, **arguments: hiding.withdraw_entry(submission=subject, is_hidden=True, **arguments),
     ),
     "appoint-owner": Action(
         User,
@@ -163,7 +163,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Nobody can sign in to it or use its tokens. Its entries stay.",
         "Close account",
         ActionForm,
-        lambda subject, now, **told: hiding.set_active(user=subject, is_active=False, **told),
+        lambda subject, now, **arguments: hiding.set_active(user=subject, is_active=False, **arguments),
     ),
     "open-account": Action(
         User,
@@ -171,7 +171,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "The person can sign in again.",
         "Open account",
         ActionForm,
-        lambda subject, now, **told: hiding.set_active(user=subject, is_active=True, **told),
+        lambda subject, now, **arguments: hiding.set_active(user=subject, is_active=True, **arguments),
     ),
     "revoke-tokens": Action(
         User,
@@ -179,7 +179,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "All of them end at once. The person can create new ones.",
         "Revoke tokens",
         ActionForm,
-        lambda subject, **told: tokens.revoke_all(user=subject, **told),
+        lambda subject, **arguments: tokens.revoke_all(user=subject, **arguments),
     ),
     "forget-person": Action(
         User,
@@ -188,7 +188,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "A team without other members loses its name. Scores stay. This cannot be undone.",
         "Forget person",
         ActionForm,
-        lambda subject, **told: forgetting.forget(user=subject, **told),
+        lambda subject, **arguments: forgetting.forget(user=subject, **arguments),
     ),
 }
 
@@ -197,12 +197,12 @@ ACTIONS: Final[Mapping[str, Action]] = {
 @require_safe
 def team(request: HttpRequest, team_id: UUID) -> HttpResponse:
     """A team: its people, methods and submissions, and what can be done about each."""
-    found = get_object_or_404(Team, pk=team_id)
-    sent = Submission.objects.filter(method__team=found).select_related("method")
+    row = get_object_or_404(Team, pk=team_id)
+    sent = Submission.objects.filter(method__team=row).select_related("method")
     context = {
-        "team": found,
-        "members": found.memberships.select_related("user").order_by("joined_at"),
-        "methods": Method.objects.existing().filter(team=found).order_by("name"),
+        "team": row,
+        "members": row.memberships.select_related("user").order_by("joined_at"),
+        "methods": Method.objects.existing().filter(team=row).order_by("name"),
         "sent": _with_states(sent.order_by("-submitted_at")[:MAX_ENTRIES]),
     }
     return render(request, "maintain/team.html", context)
@@ -221,7 +221,7 @@ def _with_states(sent: Iterable[Submission]) -> list[Submission]:
 
 @maintainers_form
 def action(request: HttpRequest, action_name: str, subject_id: str) -> HttpResponse:
-    """Say what an action does, ask for the reason, and do it."""
+    """Show what an action does, ask for the reason, and do it."""
     if action_name not in ACTIONS:
         raise Http404
     chosen = ACTIONS[action_name]
@@ -233,8 +233,8 @@ def action(request: HttpRequest, action_name: str, subject_id: str) -> HttpRespo
     team = _team_of(subject)
     if form.is_valid():
         with form.refusals():
-            told = {**form.cleaned_data, "actor": maintainer_of(request), "now": timezone.now()}
-            chosen.do(subject=subject, **told)
+            arguments = {**form.cleaned_data, "actor": maintainer_of(request), "now": timezone.now()}
+            chosen.do(subject=subject, **arguments)
             messages.success(request, f"Done: {chosen.heading[:1].lower()}{chosen.heading[1:]}.")
             return redirect("maintain_team", team.pk) if team else redirect("maintain_quotas")
     about = {"action": chosen, "subject": _name_of(subject), "team": team}

@@ -49,7 +49,7 @@ class PaperForm(SiteForm):
             super().refuse(refusal)
 
     def document(self) -> dict[str, Any]:
-        """What was sent. Raises `BadDocument`."""
+        """Return the document that was sent. Raises `BadDocument`."""
         return papers.parse(self.cleaned_data["file"].read(papers.MAX_BYTES + 1))
 
 

@@ -50,20 +50,20 @@ def queue_table(*, state: str = "", split: str = "", number: Any = 1) -> dict[st
 
     `seen` changes when a row or a count does.
     """
-    found, faults, now = totals(split=split), list(_faults()), clock.database_now()
+    summary, faults, now = totals(split=split), list(_faults()), clock.database_now()
     sections: list[dict[str, Any]] = []
-    shown: list[object] = [found, faults]
+    shown: list[object] = [summary, faults]
     for name in [state] if state else STATES:
         paginator = Paginator(_listed(STATES[name], split=split), PER_PAGE if state else PER_SECTION)
         # Counted already, for all lists at once.
-        paginator.count = found["counts"][name]
+        paginator.count = summary["counts"][name]
         page = paginator.get_page(number if state else 1)
         rows = [(each, ", ".join(_tags(each)), strike_words(each), _until(each, now=now)) for each in page]
         sections.append({"name": name, "heading": STATES[name].heading, "page": page, "rows": rows})
         shown += [page.number, *((row.pk, row.attempt, row.last_error, *more) for row, *more in rows)]
     return {
-        **found,
-        "headings": [(name, each.heading, found["counts"][name]) for name, each in STATES.items()],
+        **summary,
+        "headings": [(name, each.heading, summary["counts"][name]) for name, each in STATES.items()],
         "sections": sections,
         "faults": faults,
         "seen": hashlib.sha256(repr(shown).encode()).hexdigest()[:16],

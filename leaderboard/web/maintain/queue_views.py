@@ -56,7 +56,7 @@ def queue(request: HttpRequest) -> HttpResponse:
 @maintainers_only
 @require_safe
 def queue_state(request: HttpRequest) -> HttpResponse:
-    """What an open page asks for: nothing new, or what the queue is now."""
+    """Answer an open page: nothing new, or the present queue."""
     asked = QueueFilter(request.GET)
     if not asked.is_valid():
         return HttpResponse(status=400)
@@ -94,11 +94,11 @@ def _page(request: HttpRequest, *, status: int = 200, **more: Any) -> HttpRespon
 
 
 def _context(request: HttpRequest, asked: QueueFilter) -> dict[str, Any]:
-    found = queue_table(**asked.cleaned_data, number=request.GET.get("page"))
-    number = found["sections"][0]["page"].number if asked.cleaned_data["state"] else 1
+    table = queue_table(**asked.cleaned_data, number=request.GET.get("page"))
+    number = table["sections"][0]["page"].number if asked.cleaned_data["state"] else 1
     return {
         "form": asked,
-        "shown": found,
+        "shown": table,
         "query": asked.query(),
         "split_query": asked.query(state=""),
         "page_query": asked.query(page=number if number > 1 else ""),

@@ -15,7 +15,7 @@ _FOR_MAINTAINERS: Final = "One sentence for maintainers and the audit log. The t
 
 
 class TeamLookup(SiteForm):
-    """A part of a team's name, or of somebody's address."""
+    """A part of a team's name, or of a member's address."""
 
     team = forms.CharField(label="Team, or email address of a person", required=False, max_length=254)
 
@@ -83,7 +83,7 @@ class OverrideForm(QuotaRulesForm):
 
     @staticmethod
     def filled_with(rules: QuotaRules) -> dict[str, Any]:
-        """What stands in the form at first: rules as they are, without their reason."""
+        """Return what the form shows at first: rules as they are, without their reason."""
         return {
             "quota_limit": rules.quota_limit,
             "quota_window": span(rules.quota_window),
@@ -92,7 +92,7 @@ class OverrideForm(QuotaRulesForm):
         }
 
     def rules(self) -> dict[str, Any]:
-        """What was filled in, under the names of `rules.override`."""
+        """Return the cleaned fields under the names of `rules.override`."""
         return {name.removeprefix("quota_"): value for name, value in self.cleaned_data.items()}
 
 

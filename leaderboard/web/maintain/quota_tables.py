@@ -13,7 +13,7 @@ from leaderboard.quotas import limits
 from leaderboard.quotas.spans import span
 from leaderboard.web.formatting import grouped
 
-MAX_FOUND = 50
+MAX_MATCHES = 50
 
 
 def rules_of(row: QuotaRules) -> dict[str, str]:
@@ -66,19 +66,19 @@ def team_rows(team: Team, *, viewer: User, now: datetime) -> list[dict[str, Any]
 
 
 def teams_like(text: str) -> list[Team]:
-    """Teams with this text in their name or in somebody's address; one more than are shown."""
+    """Return teams with this text in their name or in a member's address; one more than are shown."""
     by_address = Team.objects.filter(members__email__icontains=text).values("pk")
     fits = Q(name__icontains=text) | Q(pk__in=by_address)
     look = names.skeleton(text)
     if look:
         fits |= Q(look__contains=look)
-    return list(Team.objects.filter(fits).prefetch_related("members").order_by("name")[: MAX_FOUND + 1])
+    return list(Team.objects.filter(fits).prefetch_related("members").order_by("name")[: MAX_MATCHES + 1])
 
 
 def people_alone(text: str) -> QuerySet[User]:
     """Accounts with this text in their address that are in no team."""
     alone = User.objects.filter(email__icontains=text, membership=None)
-    return alone.exclude(email__endswith=f"@{forgetting.NOWHERE}").order_by("email")[:MAX_FOUND]
+    return alone.exclude(email__endswith=f"@{forgetting.NOWHERE}").order_by("email")[:MAX_MATCHES]
 
 
 def _most(count: int | None) -> str:

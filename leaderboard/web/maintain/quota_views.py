@@ -30,15 +30,15 @@ def quota_rules(request: HttpRequest) -> HttpResponse:
     """The rules of every split, the teams that have others, and a way to look up a team."""
     lookup = TeamLookup(request.GET)
     text = lookup.cleaned_data["team"] if lookup.is_valid() else ""
-    found = quota_tables.teams_like(text) if text else []
+    matches = quota_tables.teams_like(text) if text else []
     overrides = QuotaOverride.objects.select_related("team", "set_by")
     overrides = overrides.order_by("split__position", "split", "team__name")
     page = Paginator(overrides, PER_PAGE).get_page(request.GET.get("page"))
     context = {
         "form": lookup,
         "text": text,
-        "found": found[: quota_tables.MAX_FOUND],
-        "is_cut": len(found) > quota_tables.MAX_FOUND,
+        "teams": matches[: quota_tables.MAX_MATCHES],
+        "is_cut": len(matches) > quota_tables.MAX_MATCHES,
         "people": quota_tables.people_alone(text) if text else [],
         "splits": [(split, quota_tables.rules_of(split)) for split in Split.objects.all()],
         "page": page,
@@ -51,7 +51,7 @@ def quota_rules(request: HttpRequest) -> HttpResponse:
 @maintainers_only
 @require_safe
 def team_quotas(request: HttpRequest, team_id: UUID) -> HttpResponse:
-    """What a team has spent and has left on every split, and by whose rules."""
+    """Show what a team has used and has left on every split, and the rules that apply."""
     team = get_object_or_404(Team, pk=team_id)
     rows = quota_tables.team_rows(team, viewer=maintainer_of(request), now=timezone.now())
     context = {"team": team, "people": team.members.order_by("email"), "rows": rows}
@@ -61,20 +61,20 @@ def team_quotas(request: HttpRequest, team_id: UUID) -> HttpResponse:
 @maintainers_form
 def override(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
     """Give a team rules of its own on a split, or others than it has."""
-    team, found = get_object_or_404(Team, pk=team_id), get_object_or_404(Split, pk=split)
-    own = QuotaOverride.objects.filter(team=team, split=found).select_related("set_by").first()
-    form = OverrideForm.asked(request, initial=OverrideForm.filled_with(own or found))
+    team, split_row = get_object_or_404(Team, pk=team_id), get_object_or_404(Split, pk=split)
+    own = QuotaOverride.objects.filter(team=team, split=split_row).select_related("set_by").first()
+    form = OverrideForm.asked(request, initial=OverrideForm.filled_with(own or split_row))
     if form.is_valid():
         actor, now = maintainer_of(request), timezone.now()
         try:
-            limits.override(team=team, split=found, actor=actor, now=now, **form.rules())
+            limits.override(team=team, split=split_row, actor=actor, now=now, **form.rules())
         except Team.DoesNotExist:
             raise Http404 from None  # it has just ended
         messages.success(request, f"{team.name} now has an override on {split}.")
         return redirect("maintain_team_quotas", team.pk)
     lead = "An override replaces the rules of the split from the next submission."
     words = {"heading": "Override for", "lead": lead, "button": "Save"}
-    return _form(request, form, team=team, split=found, own=own, words=words)
+    return _form(request, form, team=team, split=split_row, own=own, words=words)
 
 
 @maintainers_form
@@ -95,12 +95,12 @@ def end_override(request: HttpRequest, team_id: UUID, split: str) -> HttpRespons
 @maintainers_form
 def admit(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
     """Admit a team to a split."""
-    team, found = get_object_or_404(Team, pk=team_id), get_object_or_404(Split, pk=split)
+    team, split_row = get_object_or_404(Team, pk=team_id), get_object_or_404(Split, pk=split)
     form = EndForm.asked(request)
     if form.is_valid():
         actor, now = maintainer_of(request), timezone.now()
         try:
-            admissions.admit(team=team, split=found, actor=actor, now=now, **form.cleaned_data)
+            admissions.admit(team=team, split=split_row, actor=actor, now=now, **form.cleaned_data)
         except Team.DoesNotExist:
             raise Http404 from None  # it has just ended
         messages.success(request, f"{team.name} is admitted to {split}.")

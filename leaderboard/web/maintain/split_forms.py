@@ -98,10 +98,10 @@ class PolicyForm(QuotaRulesForm):
     def sections(self) -> list[tuple[str, list[forms.BoundField]]]:
         """The fields as the page shows them: each heading with those below it."""
         below = {name: title for title, names in _SECTIONS for name in names}
-        found: dict[str, list[forms.BoundField]] = {"": [], **{title: [] for title, _ in _SECTIONS}}
+        by_title: dict[str, list[forms.BoundField]] = {"": [], **{title: [] for title, _ in _SECTIONS}}
         for field in self:
-            found[below.get(field.name, "")].append(field)
-        return list(found.items())
+            by_title[below.get(field.name, "")].append(field)
+        return list(by_title.items())
 
     @staticmethod
     def filled_with(policy: Policy) -> dict[str, Any]:
@@ -144,7 +144,7 @@ class NewSplitForm(PolicyForm):
         ]
 
     def wanted(self) -> dict[str, Any]:
-        """What was filled in, under the names of `new_splits.add_split`."""
+        """Return the cleaned fields under the names of `new_splits.add_split`."""
         truth = self.cleaned_data["truth"]
         is_own = not truth.startswith("as ")
         return {

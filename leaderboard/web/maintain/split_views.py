@@ -51,14 +51,14 @@ def add(request: HttpRequest) -> HttpResponse:
 @maintainers_form
 def change(request: HttpRequest, split: str) -> HttpResponse:
     """Change the policy of a split."""
-    found = get_object_or_404(Split, pk=split)
-    form = PolicyForm.asked(request, initial=PolicyForm.filled_with(policy.policy_of(found)))
+    split_row = get_object_or_404(Split, pk=split)
+    form = PolicyForm.asked(request, initial=PolicyForm.filled_with(policy.policy_of(split_row)))
     if form.is_valid():
         with form.refusals():
             policy.change(split_name=split, policy=form.policy(), actor=maintainer_of(request))
             messages.success(request, f"The split {split} was changed.")
             return redirect("maintain_splits")
-    return form_page(request, "maintain/split_form.html", form, split=found)
+    return form_page(request, "maintain/split_form.html", form, split=split_row)
 
 
 @maintainers_form
@@ -101,17 +101,17 @@ class MailForm(SiteForm):
 @maintainers_form
 def mail(request: HttpRequest, split: str) -> HttpResponse:
     """Write a mail to the teams of a split, preview it, and send it: each is a step of one form."""
-    found = get_object_or_404(Split, pk=split)
+    split_row = get_object_or_404(Split, pk=split)
     step = request.POST.get("step", "")
     if step == "write":
         initial = {name: request.POST.get(name, "") for name in MailForm.base_fields}
-        return form_page(request, "maintain/mail.html", MailForm(initial=initial), split=found)
+        return form_page(request, "maintain/mail.html", MailForm(initial=initial), split=split_row)
     form = MailForm.asked(request)
     if form.is_valid():
         with form.refusals():
-            announcement = announcements.written(split=found, **form.cleaned_data)
+            announcement = announcements.written(split=split_row, **form.cleaned_data)
             return _sent(request, announcement) if step == "send" else _preview(request, announcement)
-    return form_page(request, "maintain/mail.html", form, split=found)
+    return form_page(request, "maintain/mail.html", form, split=split_row)
 
 
 def _preview(request: HttpRequest, announcement: Announcement) -> HttpResponse:

@@ -45,7 +45,7 @@ class MethodForm(DetailsForm):
         return cls.asked(request, initial=_stated(method))
 
     def changes(self) -> dict[str, object]:
-        """What was sent, under the domain function's names; a field that was not sent stays as it is."""
+        """Return the fields that were sent, under the domain function's names; others stay as they are."""
         return {name: value for name, value in self.cleaned_data.items() if name in self.data}
 
 
@@ -64,15 +64,15 @@ def _field_of(detail: Detail) -> forms.CharField:
 
 
 def _stated(method: Method) -> dict[str, Any]:
-    found = {name: getattr(method, name) for name in editing.FIELDS}
+    values = {name: getattr(method, name) for name in editing.FIELDS}
     for detail in DETAILS:
         texts = {option.value: option.text for option in detail.kind.options}
-        found[detail.name] = texts.get(found[detail.name], found[detail.name])
-    return found
+        values[detail.name] = texts.get(values[detail.name], values[detail.name])
+    return values
 
 
 class ShowForm(SiteForm):
-    """Who is to see a method, and that its team knows what that means."""
+    """The visibility of a method, and the confirmation of its team."""
 
     visibility = forms.CharField(
         required=False,
@@ -98,7 +98,7 @@ class ShowForm(SiteForm):
         return cls({"visibility": chosen, "reveal_on": request.GET.get("reveal_on", "")})
 
     def wanted(self) -> dict[str, Any]:
-        """What was chosen, under the domain function's names: the day begins at midnight UTC."""
+        """Return the choice under the domain function's names: the day begins at midnight UTC."""
         chosen, day = self.cleaned_data["visibility"], self.cleaned_data["reveal_on"]
         has_day = day is not None and chosen == Visibility.ANONYMOUS
         return {

@@ -25,19 +25,19 @@ from leaderboard.web.methods.result_tables import edition_groups, method_result
 def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
     """A method: what it is, and what it achieved on each split."""
     rows = Method.objects.visible_to(request.user).select_related("team")
-    found = get_object_or_404(rows, pk=method_id)
-    achieved = results.results(method=found, viewer=request.user, splits=splits_of(request))
-    profile = results.profile(method=found, viewer=request.user)
-    is_mine = Method.objects.of(request.user).filter(pk=found.pk).exists()
-    sent_to = _sent_to(request, found) if is_mine and not achieved else None
+    row = get_object_or_404(rows, pk=method_id)
+    achieved = results.results(method=row, viewer=request.user, splits=splits_of(request))
+    profile = results.profile(method=row, viewer=request.user)
+    is_mine = Method.objects.of(request.user).filter(pk=row.pk).exists()
+    sent_to = _sent_to(request, row) if is_mine and not achieved else None
     context = {
         "profile": profile,
         "details": details.words(profile.details),
-        "visibility": found.visibility,
-        "is_named": found.is_named_for(request.user),
+        "visibility": row.visibility,
+        "is_named": row.is_named_for(request.user),
         "is_mine": is_mine,
-        "can_be_deleted": is_mine and empty_methods.can_be_deleted(found),
-        "method_id": found.pk,
+        "can_be_deleted": is_mine and empty_methods.can_be_deleted(row),
+        "method_id": row.pk,
         "results": [method_result(result) for result in achieved],
         "sent_to": sent_to,
         "board_split": achieved[0].split.pk if achieved else sent_to.pk if sent_to else "",
@@ -60,55 +60,55 @@ def _own(request: HttpRequest, method_id: UUID) -> Method:
 
 @own_form
 def edit(request: HttpRequest, method_id: UUID) -> HttpResponse:
-    """Say something else of a method."""
-    found = _own(request, method_id)
-    form = MethodForm.of_method(request, method=found)
+    """Change the details of a method."""
+    own = _own(request, method_id)
+    form = MethodForm.of_method(request, method=own)
     if form.is_valid():
         with form.refusals():
-            editing.edit(method=found, changes=form.changes(), actor=cast("User", request.user))
+            editing.edit(method=own, changes=form.changes(), actor=cast("User", request.user))
             messages.success(request, "The details are saved.")
-            return redirect("method", found.pk)
+            return redirect("method", own.pk)
     return render(
-        request, "methods/edit.html", {"method": found, "form": form}, status=422 if form.errors else 200
+        request, "methods/edit.html", {"method": own, "form": form}, status=422 if form.errors else 200
     )
 
 
 @own_form
 def delete(request: HttpRequest, method_id: UUID) -> HttpResponse:
-    """Say what deleting an empty method does, and do it; of any other say why it stays."""
-    found = _own(request, method_id)
+    """Delete an empty method after a page that explains it; for any other method say why it stays."""
+    own = _own(request, method_id)
     refusal = None
     if request.method == "POST":
         try:
-            empty_methods.delete(method=found, actor=cast("User", request.user), now=timezone.now())
+            empty_methods.delete(method=own, actor=cast("User", request.user), now=timezone.now())
         except Refused as fault:
             refusal = fault
         else:
-            messages.success(request, f"{found.name} is deleted.")
+            messages.success(request, f"{own.name} is deleted.")
             return redirect("submissions")
-    context = {"method": found, "refusal": refusal, "is_empty": empty_methods.can_be_deleted(found)}
+    context = {"method": own, "refusal": refusal, "is_empty": empty_methods.can_be_deleted(own)}
     return render(request, "methods/delete.html", context, status=422 if refusal else 200)
 
 
 @own_form
 def change_visibility(request: HttpRequest, method_id: UUID) -> HttpResponse:
     """Choose who sees a method, look at what they would see, and show it."""
-    found = _own(request, method_id)
+    own = _own(request, method_id)
     now = timezone.now()
-    form = ShowForm.of_method(request, method=found)
+    form = ShowForm.of_method(request, method=own)
     preview = None
     if form.is_valid():
         with form.refusals():
             wanted = form.wanted()
-            visibility.require_possible(found, now=now, **wanted)
-            preview = visibility_preview.preview(method=found, visibility=wanted["visibility"], now=now)
+            visibility.require_possible(own, now=now, **wanted)
+            preview = visibility_preview.preview(method=own, visibility=wanted["visibility"], now=now)
             if request.method == "POST" and not form.cleaned_data["confirm"]:
                 form.add_error("confirm", "Confirm that this cannot be undone: tick the box.")
             elif request.method == "POST":
-                visibility.change(method=found, actor=cast("User", request.user), now=now, **wanted)
-                messages.success(request, _published_sentence(found.pk))
-                return redirect("method", found.pk)
-    context = {"method": found, "form": form}
+                visibility.change(method=own, actor=cast("User", request.user), now=now, **wanted)
+                messages.success(request, _published_sentence(own.pk))
+                return redirect("method", own.pk)
+    context = {"method": own, "form": form}
     if preview is not None:
         context["preview"] = preview
         context["preview_label"] = Visibility(preview.visibility).label

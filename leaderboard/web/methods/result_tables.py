@@ -42,7 +42,7 @@ class ResultGroup:
 
     @property
     def has_intervals(self) -> bool:
-        """Whether any of the values has one: else the row for them is left out."""
+        """Whether any of the values has one: without any, the row for them is left out."""
         return any(cell.interval for _, cell, _ in self.columns)
 
     @property
@@ -71,7 +71,7 @@ def edition_groups(entry: Entry, edition: Edition) -> tuple[ResultGroup, ...]:
 
 
 def method_result(result: Result) -> dict[str, Any]:
-    """What a method achieved on a split, for its page; nothing to compare with: no `compare_href`."""
+    """Return the result of a method on a split for its page; `compare_href` is empty without others."""
     entry = result.entry
     return {
         "result": result,
@@ -124,8 +124,8 @@ def _reason(evaluation: Evaluation) -> str:
         return "An error on our side; a maintainer will retry it."
     if evaluation.status != Status.REJECTED or not evaluation.problems:
         return ""
-    # What was found says enough here; what was expected stands on the submission's page.
-    found = evaluation.problems[0]["message"].partition("; expected")[0]
+    # The fault says enough here; what was expected is on the submission's page.
+    message = evaluation.problems[0]["message"].partition("; expected")[0]
     # Cut between words: the half of a number is another number.
-    first = shorten(found, _MAX_REASON, placeholder=" …")
+    first = shorten(message, _MAX_REASON, placeholder=" …")
     return f"{evaluation.n_problems:,} problems: {first}" if evaluation.n_problems > 1 else first

@@ -1,4 +1,4 @@
-"""What each request passes, and what browsers may load."""
+"""The middleware that each request passes, and the content that browsers may load."""
 
 from collections.abc import Iterable
 from typing import Any, Final
@@ -16,7 +16,7 @@ MIDDLEWARE: Final = [
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     # Around what is kept, so that an answer is whole where it is remembered and a 304 only for who has it.
     "leaderboard.api.middleware.ApiHeadersMiddleware",
-    # Before sessions and accounts, which somebody without either should not pay for.
+    # Before sessions and accounts, which a visitor without either should not pay for.
     "leaderboard.web.middleware.public_answers.PublicAnswersMiddleware",
     "django.contrib.sessions.middleware.SessionMiddleware",
     "django.middleware.common.CommonMiddleware",
@@ -35,7 +35,7 @@ _PROVIDERS: Final = {"orcid": "https://orcid.org", "github": "https://github.com
 
 
 def content_security_policy(providers: Iterable[str]) -> dict[str, Any]:
-    """What browsers may load and where forms may lead: to this site, and to the providers that it offers."""
+    """Return the content security policy: content from this site, forms to it and to these providers."""
     return {
         "DIRECTIVES": {
             "default-src": [NONE],

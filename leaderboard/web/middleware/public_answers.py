@@ -57,7 +57,7 @@ HEADER_OF_304: Final = "Cross-Origin-Resource-Policy"
 
 
 class PublicAnswer(NamedTuple):
-    """What is kept: the digest of the bytes, the headers that are everybody's, and the bytes, compressed."""
+    """A cached answer: the digest of the bytes, the headers for everybody, and the bytes, compressed."""
 
     digest: str
     headers: dict[str, str]
@@ -95,7 +95,7 @@ class PublicAnswersMiddleware:
 
 
 def is_anybodys(request: HttpRequest) -> bool:
-    """Whether nothing about the request says who asks, and it asks for one of our names."""
+    """Whether the request is an anonymous GET or HEAD of a whole page, under one of our host names."""
     return (
         request.method in {"GET", "HEAD"}
         and "HTTP_AUTHORIZATION" not in request.META

@@ -38,7 +38,7 @@ class UploadLimitMiddleware:
 
 
 class SendThrottle(rate_limits.Throttle):
-    """What somebody sends, of one account, else of one address."""
+    """Requests that send something, of one account, else of one address."""
 
     rates, scope, cache = "PAGE_RATES", "send", cache
 
@@ -53,7 +53,7 @@ class DrawThrottle(rate_limits.Throttle):
 
 
 class DrawAsOfThrottle(rate_limits.Throttle):
-    """Of these, boards as of a time."""
+    """Pages drawn of boards as of a time, for one address."""
 
     rates, scope = "PAGE_RATES", "as_of"
 

@@ -25,7 +25,7 @@ class RequestLogMiddleware(RequestMiddleware):
         super().prepare(request)
 
     def handle_response(self, request: HttpRequest, response: HttpResponse) -> None:
-        """Write the line, and tell the id to whoever asked."""
+        """Write the line, and put the id in the response."""
         _count(request, response)
         response["X-Request-ID"] = structlog.contextvars.get_contextvars().get("request_id", "")
         if request.path in QUIET and response.status_code < 500:
@@ -35,7 +35,7 @@ class RequestLogMiddleware(RequestMiddleware):
 
     @staticmethod
     def format_request(request: HttpRequest) -> str:
-        """Method and path; what stays out is the query, which somebody typed, and what lets its reader in."""
+        """Return method and path; left out are the query, which a person typed, and secrets."""
         path = SECRET_PATH.sub(r"\1…", request.path)
         return f"{request.method} {path}"
 
@@ -52,7 +52,7 @@ def _count(request: HttpRequest, response: HttpResponse) -> None:
     """Count the answer under the name of its route; what was answered from memory has none."""
     if request.path in QUIET:
         return
-    found = request.resolver_match
-    route = (found.view_name or "unnamed") if found else ("memory" if response.status_code < 400 else "none")
+    match = request.resolver_match
+    route = (match.view_name or "unnamed") if match else ("memory" if response.status_code < 400 else "none")
     took_s = time.perf_counter() - request.META.get("tsttc.begun_s", time.perf_counter())
     prometheus.count(method=request.method or "", route=route, status=response.status_code, took_s=took_s)

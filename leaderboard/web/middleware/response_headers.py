@@ -51,11 +51,11 @@ class HeadersMiddleware:
 
     @staticmethod
     def _say_who_may_keep(request: HttpRequest, response: HttpResponse) -> None:
-        said = response.headers.get("Cache-Control", "")
-        if _is_ones_own(request, response) or "no-store" in said:
+        cache_control = response.headers.get("Cache-Control", "")
+        if _is_ones_own(request, response) or "no-store" in cache_control:
             response.headers["Cache-Control"] = ONES_OWN
             response.headers.pop("Expires", None)
-        elif not said:
+        elif not cache_control:
             response.headers["Cache-Control"] = ANYBODYS if response.status_code < 400 else FAULTS
 
 

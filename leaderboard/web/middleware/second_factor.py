@@ -1,4 +1,4 @@
-"""Where `TSTTC_REQUIRE_SECOND_FACTOR` is on, only a second factor makes a session that of a maintainer."""
+"""With `TSTTC_REQUIRE_SECOND_FACTOR` on, a session is a maintainer's only after a second factor."""
 
 from collections.abc import Callable
 from typing import Any, Final
@@ -32,7 +32,7 @@ class SecondFactorMiddleware:
         self._get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponse:
-        """Look at the session as soon as somebody asks for its user."""
+        """Check the session as soon as its user is read."""
         if settings.REQUIRE_SECOND_FACTOR:
             user = request.user
             request.user = SimpleLazyObject(lambda: _marked(request, user))  # type: ignore[assignment]  # it is lazy, as Django's own

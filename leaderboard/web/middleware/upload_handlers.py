@@ -37,5 +37,5 @@ class UnnamedFileUploadHandler(TemporaryFileUploadHandler):
         with suppress(OSError, AttributeError):
             self.file.close()
 
-    # Of a request that could not be read on, no handler is told.
+    # No handler hears of a request that could not be read to its end.
     __del__ = upload_interrupted

@@ -83,7 +83,7 @@ class SubmissionForm(DetailsForm):
         self._preferred = request.GET.get("split", "")
         self.max_bytes = settings.MAX_PREDICTIONS_BYTES
 
-    # Asked for by whoever draws the form: a file that is taken is answered without any of it.
+    # Read only where the form is drawn: a file that is accepted is answered without any of it.
     @cached_property
     def offers(self) -> list[SplitChoice]:
         return offers_for(self._user, now=timezone.now())
@@ -108,19 +108,19 @@ class SubmissionForm(DetailsForm):
     def notices(self) -> list[str]:
         """Which of the team's methods others see, each in a sentence; of a chosen one that alone."""
         chosen = [method for method in self.methods if method.name == self["method"].value()]
-        told = (visibility.notice_of(method) for method in chosen or self.methods)
-        return [sentence for sentence in told if sentence]
+        sentences = (visibility.notice_of(method) for method in chosen or self.methods)
+        return [sentence for sentence in sentences if sentence]
 
     @property
     def options(self) -> list[tuple[str, str]]:
-        """The names of the team's methods to choose from, and what is to be told of each."""
+        """Return the names of the team's methods to choose from, each with its notice."""
         return [(method.name, visibility.notice_of(method)) for method in self.methods]
 
     @property
     def shows_details(self) -> bool:
         """Whether the fields of details are open: for a first method, and where one has text or an error."""
-        told = (*self.described, *self.detailed)
-        return not self.methods or any(field.value() or field.errors for field in told)
+        fields = (*self.described, *self.detailed)
+        return not self.methods or any(field.value() or field.errors for field in fields)
 
     def submission_request(self, *, now: datetime) -> SubmissionRequest:
         """The submission that the valid form asks for."""
@@ -150,7 +150,7 @@ def _splits() -> list[tuple[str, str]]:
 
 
 class SearchForm(forms.Form):
-    """What to look for among one's own submissions; what cannot be understood is told, and asks nothing."""
+    """The search in one's own submissions; an invalid field shows its fault and filters nothing."""
 
     q = forms.CharField(
         label="Search",
@@ -173,13 +173,13 @@ class SearchForm(forms.Form):
         return form
 
     def wanted(self) -> dict[str, Any]:
-        """What was understood, by the names of `search.matching`."""
-        found = self.cleaned_data
+        """Return the valid fields under the names of `search.matching`."""
+        fields = self.cleaned_data
         method = self.chosen_method.pk if self.chosen_method else None
         return {
-            "text": found.get("q", ""),
-            "split": found.get("split", ""),
-            "state": found.get("state", ""),
+            "text": fields.get("q", ""),
+            "split": fields.get("split", ""),
+            "state": fields.get("state", ""),
             "method": method,
         }
 
@@ -191,5 +191,5 @@ class SearchForm(forms.Form):
     def address(self) -> str:
         """The query that asks the same, to be followed by a page."""
         names = {"text": "q"}
-        found = {names.get(name, name): value for name, value in self.wanted().items() if value}
-        return f"{urlencode(found)}&" if found else ""
+        query = {names.get(name, name): value for name, value in self.wanted().items() if value}
+        return f"{urlencode(query)}&" if query else ""

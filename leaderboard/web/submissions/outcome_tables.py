@@ -25,7 +25,7 @@ def outcome_table(
     submission: Submission,
     progress: Progress,
     *,
-    place: BoardPosition | None,
+    board_position: BoardPosition | None,
     interval_note: str,
     is_mine: bool,
 ) -> dict[str, Any] | None:
@@ -38,22 +38,24 @@ def outcome_table(
         team=submission.method.team.name,
         scores=progress.scores,
         decimals=progress.decimals,
-        intervals=outcomes.published_intervals(progress, place),
+        intervals=outcomes.published_intervals(progress, board_position),
         method_id=submission.method_id,
         submission_id=submission.pk,
         visibility=submission.method.visibility,
         pseudonym=submission.method.pseudonym if submission.method.visibility == Visibility.ANONYMOUS else "",
-        rank=place.rank if place else None,
-        best=place.best if place else frozenset(),
-        second=place.second if place else frozenset(),
+        rank=board_position.rank if board_position else None,
+        best=board_position.best if board_position else frozenset(),
+        second=board_position.second if board_position else frozenset(),
     )
     return {
         "groups": result_groups(entry, progress.counts),
         "interval_note": interval_note,
-        "place": place,
+        "board_position": board_position,
         "rank_range": rank_range(entry),
         "errors": tuple(grouped_names(progress.scores)),
-        "beside": _comparison_rows(submission, progress, place, entry, is_mine=is_mine) if place else [],
+        "beside": _comparison_rows(submission, progress, board_position, entry, is_mine=is_mine)
+        if board_position
+        else [],
         "latex": tables.latex_row(entry),
         "latex_order": _order_words(progress.scores),
     }
@@ -72,13 +74,13 @@ def _order_words(names: Iterable[str]) -> str:
 
 
 def _comparison_rows(
-    submission: Submission, progress: Progress, place: BoardPosition, entry: Entry, *, is_mine: bool
+    submission: Submission, progress: Progress, board_position: BoardPosition, entry: Entry, *, is_mine: bool
 ) -> list[dict[str, Any]]:
     rows = []
-    own = outcomes.teams_best_other(submission, place)
+    own = outcomes.teams_best_other(submission, board_position)
     if own is not None:
-        # Nothing is told of two methods of one team where values are hidden.
-        is_compared = is_mine and place.rank is not None and not submission.split.is_hidden
+        # Where values are hidden, two methods of one team are never compared.
+        is_compared = is_mine and board_position.rank is not None and not submission.split.is_hidden
         query = [("split", submission.split_id), ("m", submission.method_id), ("m", own.method_id)]
         rows.append(
             _comparison_row(entry, own)
@@ -90,7 +92,7 @@ def _comparison_rows(
                 else "",
             }
         )
-    printed = outcomes.nearest_published(progress, place)
+    printed = outcomes.nearest_published(progress, board_position)
     if printed is not None:
         about = f"nearest row from a paper, {tables.team_of(printed)} {printed.date_text}"
         rows.append(_comparison_row(entry, printed) | {"href": printed.paper_url, "about": about})
@@ -109,7 +111,7 @@ def _comparison_row(entry: Entry, other: Entry) -> dict[str, Any]:
 
 
 def rejected_sentence(quota: Quota | None) -> str:
-    """What a rejected file costs, and how many more are taken; `quota` None: it is no question of that.
+    """Return what a rejected file costs, and how many more are accepted; empty without a quota.
 
     >>> from leaderboard.models import QuotaOverride
     >>> rejected_sentence(Quota("test", QuotaOverride(quota_rejected_limit=20), 0, 3, True, None, ""))

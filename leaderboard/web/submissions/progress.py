@@ -32,7 +32,7 @@ class Step:
 
 @dataclass(frozen=True)
 class StateLine:
-    """What the template places. `seen` changes exactly when the line of state does.
+    """The state of a submission for the template. `seen` changes exactly when the line of state does.
 
     `is_moving`: there is more to come, and the page asks for it by itself.
     """
@@ -67,8 +67,8 @@ def steps(progress: Progress, *, awaits_intervals: bool = False) -> tuple[Step, 
     is_queued, is_running = progress.state == Status.QUEUED, progress.state == Status.RUNNING
     received = Step("Received", "done", progress.received_at)
     if is_queued:
-        place = f"{progress.n_ahead} ahead" if progress.n_ahead else "next in line"
-        queued = Step("Queued", "now", progress.queued_at, LATE if progress.is_late else place)
+        queue_position = f"{progress.n_ahead} ahead" if progress.n_ahead else "next in line"
+        queued = Step("Queued", "now", progress.queued_at, LATE if progress.is_late else queue_position)
         return received, queued, Step("Running", "ahead"), Step("Scored", "ahead")
     queued = Step("Queued", "done", progress.queued_at)
     late = LATE if is_running and progress.is_late else ""

@@ -61,7 +61,7 @@ def submit(request: HttpRequest) -> HttpResponse:
 
 
 def _taken(request: HttpRequest, taken: Submission) -> HttpResponse:
-    """Lead to the submission's page; a script that follows the upload is told the address of that page."""
+    """Redirect to the submission's page; a script that follows the upload gets its address as JSON."""
     if "application/json" in request.headers.get("Accept", ""):
         return JsonResponse({"page": reverse("submission", args=[taken.pk])}, status=201)
     return redirect("submission", taken.pk)
@@ -85,7 +85,7 @@ def template(request: HttpRequest, split: str) -> HttpResponseBase:
 
 @own_page
 def submission_list(request: HttpRequest) -> HttpResponse:
-    """What the reader's own team has sent."""
+    """List the submissions of the reader's own team."""
     evaluations = Evaluation.objects.select_related("edition").prefetch_related("scores")
     sent = (
         Submission.objects.of(cast("User", request.user))
@@ -101,19 +101,19 @@ def submission_list(request: HttpRequest) -> HttpResponse:
 @own_page
 def submission(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """One submission: its state, then its result or its problems."""
-    found, progress, now_shown = _looked_at(request, submission_id)
+    row, progress, now_shown = _looked_at(request, submission_id)
     return render(
-        request, "submissions/submission.html", _outcome(request, found, progress) | {"shown": now_shown}
+        request, "submissions/submission.html", _outcome(request, row, progress) | {"shown": now_shown}
     )
 
 
 @own_page
 def submission_state(request: HttpRequest, submission_id: UUID) -> HttpResponse:
-    """What a waiting page asks for: nothing new, the new state, or at the end not to ask any more."""
-    found, progress, now_shown = _looked_at(request, submission_id)
+    """Answer a waiting page: nothing new, the new state, or at the end to stop polling."""
+    row, progress, now_shown = _looked_at(request, submission_id)
     if request.GET.get("seen") == now_shown.seen:
         return HttpResponse(status=204)
-    context = _outcome(request, found, progress) | {"shown": now_shown, "is_fragment": True}
+    context = _outcome(request, row, progress) | {"shown": now_shown, "is_fragment": True}
     status = 200 if now_shown.is_moving else STOP_POLLING
     return render(request, "submissions/state.html", context, status=status)
 
@@ -122,15 +122,15 @@ def submission_state(request: HttpRequest, submission_id: UUID) -> HttpResponse:
 def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     user = cast("User", request.user)
     own = Submission.objects.filter(method__team__memberships__user=user)
-    found = get_object_or_404(own.select_related("method__team", "split"), pk=submission_id)
-    before = progress_of(found)
-    if request.method == "POST" and intake.withdraw(submission=found, actor=user, now=timezone.now()):
+    row = get_object_or_404(own.select_related("method__team", "split"), pk=submission_id)
+    before = progress_of(row)
+    if request.method == "POST" and intake.withdraw(submission=row, actor=user, now=timezone.now()):
         done = "withdrawn" if before.is_final else "cancelled"
         messages.success(request, f"The submission is {done}.")
-    if request.method == "POST" or not outcomes.can_be_withdrawn(found):
-        return redirect("submission", found.pk)
-    said = {"is_waiting": not before.is_final, "is_failed": before.fault_is_ours}
-    return render(request, "submissions/withdraw.html", {"submission": found, **said})
+    if request.method == "POST" or not outcomes.can_be_withdrawn(row):
+        return redirect("submission", row.pk)
+    flags = {"is_waiting": not before.is_final, "is_failed": before.fault_is_ours}
+    return render(request, "submissions/withdraw.html", {"submission": row, **flags})
 
 
 def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, Progress, StateLine]:
@@ -141,36 +141,36 @@ def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, P
         .select_related("method__team", "split", "submitted_by")
         .prefetch_related(Prefetch("evaluations", evaluations))
     )
-    found = get_object_or_404(rows, pk=submission_id)
-    progress = progress_of(found)
-    awaits = outcomes.awaits_intervals(found, progress, now=timezone.now())
-    return found, progress, state_line(progress, awaits_intervals=awaits)
+    row = get_object_or_404(rows, pk=submission_id)
+    progress = progress_of(row)
+    awaits = outcomes.awaits_intervals(row, progress, now=timezone.now())
+    return row, progress, state_line(progress, awaits_intervals=awaits)
 
 
-def _outcome(request: HttpRequest, found: Submission, progress: Progress) -> dict[str, Any]:
+def _outcome(request: HttpRequest, row: Submission, progress: Progress) -> dict[str, Any]:
     now = timezone.now()
-    is_mine = found.method.team.memberships.filter(user=cast("User", request.user)).exists()
-    rescored = edition_tables.rescored_notice(history.rescored(found))
+    is_mine = row.method.team.memberships.filter(user=cast("User", request.user)).exists()
+    rescored = edition_tables.rescored_notice(history.rescored(row))
     quota = None
     if progress.state == Status.REJECTED and rescored is None:
-        quota = limits.state(team=found.method.team, user=found.submitted_by, split=found.split, now=now)
+        quota = limits.state(team=row.method.team, user=row.submitted_by, split=row.split, now=now)
     return {
-        "submission": found,
+        "submission": row,
         "progress": progress,
         "result": outcome_tables.outcome_table(
-            found,
+            row,
             progress,
-            place=outcomes.board_position_of(found, progress),
-            interval_note=outcomes.why_no_intervals(found, progress, now=now),
+            board_position=outcomes.board_position_of(row, progress),
+            interval_note=outcomes.why_no_intervals(row, progress, now=now),
             is_mine=is_mine,
         ),
         "cost": outcome_tables.rejected_sentence(quota),
         "rescored": rescored,
         "is_mine": is_mine,
-        "can_be_withdrawn": is_mine and outcomes.can_be_withdrawn(found),
+        "can_be_withdrawn": is_mine and outcomes.can_be_withdrawn(row),
         "can_be_published": is_mine
-        and found.withdrawn_at is None
-        and found.method.visibility != Visibility.PUBLIC,
+        and row.withdrawn_at is None
+        and row.method.visibility != Visibility.PUBLIC,
     }
 
 
@@ -178,14 +178,14 @@ def _outcome(request: HttpRequest, found: Submission, progress: Progress) -> dic
 def analysis(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """Error by time to contact, its distribution, predicted against true, the worst recordings."""
     rows = Submission.objects.visible_to(request.user).select_related("method", "split__published_edition")
-    found = get_object_or_404(rows, pk=submission_id, split__is_hidden=False)
-    progress = progress_of(found)
+    row = get_object_or_404(rows, pk=submission_id, split__is_hidden=False)
+    progress = progress_of(row)
     if progress.is_final and progress.state != Status.SCORED:
         raise Http404("This submission has no score.")
-    closer = analyses.for_submission(submission=found, viewer=request.user)
+    closer = analyses.for_submission(submission=row, viewer=request.user)
     tables = analysis_charts.error_analysis_tables(closer) if closer else None
     return render(
-        request, "submissions/analysis.html", {"submission": found, "tables": tables, "closer": closer}
+        request, "submissions/analysis.html", {"submission": row, "tables": tables, "closer": closer}
     )
 
 
@@ -200,11 +200,11 @@ def receipt_keys(request: HttpRequest) -> HttpResponse:
 def receipt(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """The receipt of a score as a file, for the submission's own team."""
     rows = Submission.objects.of(cast("User", request.user))
-    found = get_object_or_404(rows.select_related("method__team", "split"), pk=submission_id)
+    row = get_object_or_404(rows.select_related("method__team", "split"), pk=submission_id)
     try:
-        document = receipts.receipt(submission=found)
+        document = receipts.receipt(submission=row)
     except intake.Refused as fault:
         return render(request, "400.html", {"sentence": str(fault)}, status=409)
     response = HttpResponse(document, content_type=receipts.MEDIA_TYPE)
-    response["Content-Disposition"] = f'attachment; filename="tsttc-receipt-{found.pk}.jwt"'
+    response["Content-Disposition"] = f'attachment; filename="tsttc-receipt-{row.pk}.jwt"'
     return response

@@ -1,4 +1,4 @@
-"""Runs the console examples of documents, so that what they show is what the command prints.
+"""Run the console examples of documents, so that they show what the command prints.
 
 `python -m tests.evaluator.cli.console` writes the present output into them; read the difference afterwards.
 """
@@ -179,7 +179,7 @@ def put_documented_answers(site: RecordedSite) -> None:
 
 
 def put_more_documented_answers(site: RecordedSite) -> None:
-    """Of the same leaderboard: quotas, a comparison, a receipt, a split with a manifest."""
+    """Add quotas, a comparison, a receipt and a split with a manifest to the same leaderboard."""
     window_s = 30 * 86400.0
     quotas = [
         {"split": "val", "limit": 50, "used": 2, "left": 48, "next_slot_at": None, "is_open": True},
@@ -193,11 +193,11 @@ def put_more_documented_answers(site: RecordedSite) -> None:
     site.put("GET /api/v1/quota", Reply(quotas))
     table = (EXAMPLES / "manifest.csv").read_bytes()
     site.put("GET /api/v1/splits/demo/manifest", Reply(table, headers={"Content-Type": "text/csv"}))
-    found = {"difference": -1.18, "low": -1.73, "high": -0.62, "p": 0.0004}
+    significant = {"difference": -1.18, "low": -1.73, "high": -0.62, "p": 0.0004}
     differences = {
-        name: found
+        name: significant
         if name in {"mid", "mid_crucial", "rte"}
-        else found | {"low": -2.9, "high": 0.54, "p": 0.17}
+        else significant | {"low": -2.9, "high": 0.54, "p": 0.17}
         for name in SCORE_NAMES
     }
     sentence = (
@@ -212,7 +212,7 @@ def put_more_documented_answers(site: RecordedSite) -> None:
 
 def published_board(split: str, scores: Mapping[str, float]) -> dict[str, object]:
     """The paper's five baselines and one submission, by rank."""
-    source = REPOSITORY / "leaderboard" / "benchmark" / "published" / "tsttc-2023.json"
+    source = REPOSITORY / "leaderboard" / "editions" / "published" / "tsttc-2023.json"
     paper = json.loads(source.read_text())
     names = {method["slug"]: method["name"] for method in paper["methods"]}
     table = published_tables().table(paper["results_of"])

@@ -10,7 +10,7 @@ __all__ = ["LockedKeyring", "NoKeyring", "RememberingKeyring"]
 
 
 class RememberingKeyring(KeyringBackend):
-    """Keeps what it is given for as long as the test runs."""
+    """Keep tokens for as long as the test runs."""
 
     priority = 1  # type: ignore[assignment]  # a property of the class in keyring, a plain number in its backends
 
@@ -34,7 +34,7 @@ class RememberingKeyring(KeyringBackend):
 
 
 class LockedKeyring(RememberingKeyring):
-    """Takes nothing, as one whose owner does not unlock it."""
+    """Refuse every token, as a keyring that its owner does not unlock."""
 
     def set_password(self, service: str, username: str, password: str) -> None:
         raise PasswordSetError("the collection is locked")

@@ -60,7 +60,7 @@ class Request:
 
 
 class RecordedSite:
-    """Gives the answers put for `METHOD path` in turn, the last one for ever; keeps the requests.
+    """Give the answers put for `METHOD path` in turn, the last one for ever; keep the requests.
 
     Without a `port` it takes one that is free.
     """

@@ -67,7 +67,7 @@ BOARD_DOCUMENT: dict[str, Any] = {
 pytestmark = pytest.mark.usefixtures("at_site")
 
 
-def test_unreachable_server_is_told_with_its_address(
+def test_message_about_an_unreachable_server_has_its_address(
     tsttc: Tsttc, clock: FakeTime, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     url = f"http://127.0.0.1:{free_port()}"
@@ -202,19 +202,19 @@ def test_board_says_below_what_the_ground_truth_itself_scores(tsttc: Tsttc, site
     floor = {"mid": 0.36, "mid_crucial": 0.0, "mid_negative": None, "rte": 0.73}
     site.put(BOARD, Reply(BOARD_DOCUMENT), Reply(BOARD_DOCUMENT | {"floor": floor}))
     plain = tsttc("board").stdout
-    said = tsttc("board").stdout
-    assert said.startswith(
+    with_floor = tsttc("board").stdout
+    assert with_floor.startswith(
         f"{plain}\nFloor: the ground truth itself, submitted as predictions, scores MiD 0.36, "
     )
     assert json.loads(tsttc("board", "--json").stdout)["floor"] == floor
 
 
-def found(document: dict[str, Any]) -> Board:
+def board_of(document: dict[str, Any]) -> Board:
     return msgspec.convert({**document, "document": document}, Board)
 
 
 def test_board_on_a_narrow_terminal_keeps_the_main_columns() -> None:
-    lines = list(boards.in_words(found(BOARD_DOCUMENT), width=70))
+    lines = list(boards.in_words(board_of(BOARD_DOCUMENT), width=70))
     assert click.unstyle(lines[3]).split() == ["rank", "method", "MiD", "RTE"]
     assert max(len(click.unstyle(line)) for line in lines[3:]) <= 70
     assert lines[-1].startswith("The terminal is too narrow")
@@ -223,7 +223,7 @@ def test_board_on_a_narrow_terminal_keeps_the_main_columns() -> None:
 def test_wide_letters_keep_the_columns_in_line() -> None:
     entry = BOARD_DOCUMENT["entries"][1] | {"method": "时间到接触"}
     rows = [BOARD_DOCUMENT["entries"][0], entry]
-    lines = list(boards.in_words(found(BOARD_DOCUMENT | {"entries": rows}), width=None))[4:]
+    lines = list(boards.in_words(board_of(BOARD_DOCUMENT | {"entries": rows}), width=None))[4:]
     assert lines[0].index("Shi et al.") == lines[1].index("TJU-V") + len("时间到接触")
 
 

@@ -43,7 +43,7 @@ def submit(tsttc: Tsttc, *more: str) -> Result:
 
 
 @pytest.mark.parametrize(
-    ("text", "is_held"),
+    ("text", "is_true"),
     [
         ("mid > 15.0", False),
         ("mid>13.99", True),
@@ -56,9 +56,9 @@ def submit(tsttc: Tsttc, *more: str) -> Result:
         ("RTE_n == 14 or MID_C > 20", True),
     ],
 )
-def test_condition_is_compared_with_the_published_value(text: str, is_held: bool) -> None:
+def test_condition_is_compared_with_the_published_value(text: str, is_true: bool) -> None:
     scores = SCORES | {"mid": 13.999}
-    assert any(condition.holds(scores) for condition in gates.parse(text)) is is_held
+    assert any(condition.holds(scores) for condition in gates.parse(text)) is is_true
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def scored(site: RecordedSite, *, mid: float | None) -> None:
 
 @pytest.mark.parametrize(("mid", "exit_code"), [(13.9, 0), (14.0, 0), (14.01, 6), (None, 6)])
 @pytest.mark.parametrize("name", ["Old", OTHER])
-def test_file_is_held_against_a_method_of_the_board(
+def test_file_is_compared_with_a_method_of_the_board(
     tsttc: Tsttc, site: RecordedSite, mid: float | None, exit_code: int, name: str
 ) -> None:
     site.put(BOARD, board(entry("Old", 14.0, method_id=OTHER), entry("Else", 1.0, method_id=None)))
@@ -140,7 +140,7 @@ def test_file_is_held_against_a_method_of_the_board(
         assert "The gate fails: MiD is 14.01, and Old has 14.00." in result.stderr
 
 
-def test_file_may_be_held_against_a_row_of_a_paper(tsttc: Tsttc, site: RecordedSite) -> None:
+def test_file_may_be_compared_with_a_row_of_a_paper(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(BOARD, board(entry("Deep Scale", 14.4, method_id=None, kind="published")))
     scored(site, mid=15.0)
     assert submit(tsttc, "--fail-if-worse-than", "Deep Scale").exit_code == 6

@@ -18,8 +18,8 @@ def test_a_file_called_evaluator_does_not_hide_the_package_from_the_command(tmp_
     for name in ("evaluator", "tsttc_baselines"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('the file in this folder was imported')")
     tsttc = Path(sys.executable).with_name("tsttc")
-    # Two processes estimate, so what the command starts is held as well.
+    # Two processes estimate, so what the command starts is tested as well.
     words = ["baseline", "run", "pixel-mse", str(EXAMPLE), "--out", "p.json", "--jobs", "2"]
-    found = subprocess.run([tsttc, *words], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert found.returncode == 0, found.stderr
+    completed = subprocess.run([tsttc, *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert completed.returncode == 0, completed.stderr
     assert len(json.loads((tmp_path / "p.json").read_text())["predictions"]) == 12

@@ -62,12 +62,12 @@ def test_token_that_the_server_refuses_is_not_kept(
 
 
 def test_machine_without_a_keyring_keeps_the_token_in_a_file_that_only_its_owner_can_read(
-    tsttc: Tsttc, site: RecordedSite, places: Path
+    tsttc: Tsttc, site: RecordedSite, settings_home: Path
 ) -> None:
     site.put("GET /api/v1/quota", Reply([]))
     result = tsttc("login", "--server", site.url, stdin=TOKEN.encode())
     assert result.exit_code == 0
-    [path] = places.rglob("tokens.json")
+    [path] = settings_home.rglob("tokens.json")
     assert f"{path}, which only you can read; this machine has no keyring" in result.stdout
     assert TOKEN not in result.output
     assert (path.stat().st_mode & 0o777, path.parent.stat().st_mode & 0o777) == (0o600, 0o700)
@@ -114,7 +114,7 @@ def test_token_goes_to_nothing_that_is_no_leaderboard(tsttc: Tsttc, monkeypatch:
             assert other.requests == []
 
 
-def test_keyring_that_stays_locked_is_told_and_means_no_token(tsttc: Tsttc, site: RecordedSite) -> None:
+def test_keyring_that_stays_locked_is_an_error_and_means_no_token(tsttc: Tsttc, site: RecordedSite) -> None:
     keyring.set_keyring(LockedKeyring())
     site.put("GET /api/v1/quota", Reply([]))
     result = tsttc("login", "--server", site.url, stdin=TOKEN.encode())
@@ -149,14 +149,14 @@ def test_token_of_one_server_is_not_sent_to_another(
 
 
 def test_logout_forgets_token_and_server(
-    tsttc: Tsttc, site: RecordedSite, ring: RememberingKeyring, places: Path
+    tsttc: Tsttc, site: RecordedSite, ring: RememberingKeyring, settings_home: Path
 ) -> None:
     site.put("GET /api/v1/quota", Reply([]))
     assert tsttc("login", "--server", site.url, stdin=TOKEN.encode()).exit_code == 0
-    assert list(places.rglob("settings.json")) != []
+    assert list(settings_home.rglob("settings.json")) != []
     assert f"The token for {site.url} is removed" in tsttc("logout").stdout
     assert ring.kept == {}
-    assert list(places.rglob("settings.json")) == []
+    assert list(settings_home.rglob("settings.json")) == []
     again = tsttc("logout", "--server", site.url)
     assert (again.exit_code, again.stdout) == (
         0,

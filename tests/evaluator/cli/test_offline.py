@@ -27,7 +27,7 @@ UNREADABLE = Path("/proc/self/mem")  # even for root, its first byte is not ther
 
 
 def problems_of(path: Path) -> list[str]:
-    """What the library says of a bad prediction file."""
+    """The library's refusal of a bad prediction file."""
     with pytest.raises(Rejected) as caught:
         read_predictions(path.read_bytes(), manifest=read_truth(TRUTH).manifest)
     return list(map(str, caught.value.problems))
@@ -171,20 +171,20 @@ def examples() -> list[list[str]]:
 
 @pytest.mark.parametrize("words", examples(), ids=" ".join)
 def test_example_of_the_help_is_called_rightly(words: list[str]) -> None:
-    """Parsed as the shell would hand it over; files that are named need not be there."""
+    """Parse it as the shell would pass it; the files that it names need not exist."""
     words = list(itertools.takewhile(lambda word: word not in {">", "|"}, words))
     command = own_commands()[words[0]]
     parser = command.make_parser(click.Context(command))
-    found, left, _ = parser.parse_args(words[1:])
+    options, left, _ = parser.parse_args(words[1:])
     assert left == []
-    assert all(parameter.name in found for parameter in command.params if parameter.required)
+    assert all(parameter.name in options for parameter in command.params if parameter.required)
 
 
 def modules_of(program: str) -> set[str]:
     """The packages that a process has loaded at the end of this program."""
-    told = "import sys; print(*sorted({name.partition('.')[0] for name in sys.modules}), file=sys.stderr)"
+    ending = "import sys; print(*sorted({name.partition('.')[0] for name in sys.modules}), file=sys.stderr)"
     done = subprocess.run(
-        [sys.executable, "-c", f"{program}\n{told}"],
+        [sys.executable, "-c", f"{program}\n{ending}"],
         capture_output=True,
         text=True,
         check=True,

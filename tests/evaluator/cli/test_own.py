@@ -32,8 +32,8 @@ def test_whoami_names_team_token_and_limits(tsttc: Tsttc, site: RecordedSite) ->
     account = {"team": "TJU-V", "token": "ci", "scopes": ["read"], "split": "val", "expires_at": "2027-01-01"}
     site.put("GET /api/v1/account", Reply(account))
     result = tsttc("whoami")
-    told = f'team TJU-V at {site.url}\ntoken "ci": read, for val only, until 2027-01-01 UTC\n'
-    assert result.stdout == told
+    expected = f'team TJU-V at {site.url}\ntoken "ci": read, for val only, until 2027-01-01 UTC\n'
+    assert result.stdout == expected
     assert json.loads(tsttc("whoami", "--json").stdout) == account
 
 
@@ -55,8 +55,8 @@ def test_submissions_are_listed_page_after_page_and_filtered(tsttc: Tsttc, site:
     lines = tsttc("submissions").stdout.splitlines()
     assert lines[1].split() == [ID, "val", "Foo++", "SCORED", "13.92"]
     assert lines[2].split() == [REJECTED_ID, "2026-11-20", "12:00", "test", "Bar", "REJECTED", "–"]
-    found = json.loads(tsttc("submissions", "--method", "Bar", "--json").stdout)
-    assert [row["id"] for row in found] == [REJECTED_ID]
+    rows = json.loads(tsttc("submissions", "--method", "Bar", "--json").stdout)
+    assert [row["id"] for row in rows] == [REJECTED_ID]
 
 
 def test_withdraw_asks_first_and_says_what_became_of_it(tsttc: Tsttc, site: RecordedSite) -> None:
@@ -98,16 +98,16 @@ def test_truth_of_a_folder_becomes_a_table_with_its_objects(tsttc: Tsttc, tmp_pa
     folder = write_folder(tmp_path / "folder", {"a.pkl": [camera({7: list(range(6))}, occ_ratio=0.25)]})
     path = tmp_path / "val.csv"
     assert tsttc("truth", folder, "-o", path).stdout == f"{path}: 1 sequence of 1 recording.\n"
-    found = read_truth(path)
-    assert found.digest == json.loads(tsttc("truth", folder, "--json").stdout)["truth_digest"]
-    assert found.objects.occ_ratio.tolist() == [0.25]
+    truth = read_truth(path)
+    assert truth.digest == json.loads(tsttc("truth", folder, "--json").stdout)["truth_digest"]
+    assert truth.objects.occ_ratio.tolist() == [0.25]
     assert tsttc("truth", path, "-o", path).exit_code == 2
 
 
 def test_a_split_that_is_not_there_is_answered_with_those_that_are(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put("GET /api/v1/splits/trial/board", Reply(problem("Nothing here."), status=404))
-    told = tsttc("board", "trial")
-    assert (told.exit_code, told.stderr) == (8, "Error: Nothing here.\nThe splits here are val.\n")
+    refused = tsttc("board", "trial")
+    assert (refused.exit_code, refused.stderr) == (8, "Error: Nothing here.\nThe splits here are val.\n")
 
 
 def test_a_withdrawn_submission_says_so(tsttc: Tsttc, site: RecordedSite) -> None:

@@ -18,7 +18,7 @@ def hello():
 
 
 @pytest.fixture(autouse=True)
-def _looked_for_anew() -> Iterator[None]:
+def _empty_cache() -> Iterator[None]:
     plugins.found.cache_clear()
     yield
     plugins.found.cache_clear()
@@ -26,7 +26,7 @@ def _looked_for_anew() -> Iterator[None]:
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An installed package with three commands, of which one works."""
+    """An installed package with three commands; one of them works."""
     (tmp_path / "foreign_commands.py").write_text(MODULE)
     (tmp_path / "foreign_fault.py").write_text("1 / 0")
     info = tmp_path / "foreign-1.0.dist-info"

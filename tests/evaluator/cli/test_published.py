@@ -22,11 +22,11 @@ def test_a_table_is_printed_in_other_formats(tsttc: Tsttc) -> None:
         ("markdown", "| Split |"),
     ):
         assert tsttc("published", "main-results", "--format", name).stdout.startswith(start)
-    found = json.loads(tsttc("published", "main-results", "--json").stdout)
-    assert found["rows"][3]["values"][0] == 14.4
+    document = json.loads(tsttc("published", "main-results", "--json").stdout)
+    assert document["rows"][3]["values"][0] == 14.4
 
 
-def test_an_unknown_table_and_a_format_without_a_table_are_said_so(tsttc: Tsttc) -> None:
+def test_an_unknown_table_and_a_format_without_a_table_are_refused(tsttc: Tsttc) -> None:
     result = tsttc("published", "nowhere")
     assert result.exit_code == 2
     assert "There is no table 'nowhere'; expected one of dataset-comparison, main-results," in " ".join(

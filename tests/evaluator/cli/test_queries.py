@@ -38,16 +38,16 @@ def test_quota_of_one_split_is_its_document(tsttc: Tsttc, site: RecordedSite) ->
 
 def board(*names: tuple[str, str | None]) -> Reply:
     scores = dict.fromkeys(SCORE_NAMES, 14.0)
-    entries = [{"method": name, "method_id": found, "team": "T", "scores": scores} for name, found in names]
+    entries = [{"method": name, "method_id": key, "team": "T", "scores": scores} for name, key in names]
     return Reply({"split": "val", "edition": 2, "entries": entries})
 
 
 def test_compare_asks_until_it_is_computed(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put("GET /api/v1/splits/val/board", board(("A", "id-a"), ("B", "id-b")))
-    found: dict[str, Any] = dict.fromkeys(SCORE_NAMES)
-    found["mid"] = {"difference": -1.2, "low": -2.0, "high": -0.4, "p": 0.003, "is_significant": True}
+    differences: dict[str, Any] = dict.fromkeys(SCORE_NAMES)
+    differences["mid"] = {"difference": -1.2, "low": -2.0, "high": -0.4, "p": 0.003, "is_significant": True}
     waiting = {"split": "val", "edition": 2, "is_complete": False, "reason": "", "entries": []}
-    pair = {"first": "id-a", "second": "id-b", "differences": found, "sentence": "A is better."}
+    pair = {"first": "id-a", "second": "id-b", "differences": differences, "sentence": "A is better."}
     ready = waiting | {"is_complete": True, "pairs": [pair]}
     unready = waiting | {"pairs": [pair | {"differences": None, "sentence": ""}]}
     site.put("GET /api/v1/compare", Reply(unready, status=202), Reply(ready))
@@ -90,10 +90,10 @@ def test_files_are_compared_offline_as_the_library_does(
     assert document["differences"]["mid"]["p"] == expected["mid"].p
     assert document["differences"]["mid"]["low"] == expected["mid"].low
     assert document["first"]["scores"]["overall"]["mid"] < document["second"]["scores"]["overall"]["mid"]
-    said = tsttc(*arguments).stdout
-    assert sentence(str(files[0]), str(files[1]), name="mid", found=expected["mid"]) in said
-    assert "9 of the 9 other metrics differ significantly" in said
-    assert influence(str(files[0]), str(files[1]), found=expected["mid"]) in said.splitlines()
+    text = tsttc(*arguments).stdout
+    assert sentence(str(files[0]), str(files[1]), name="mid", found=expected["mid"]) in text
+    assert "9 of the 9 other metrics differ significantly" in text
+    assert influence(str(files[0]), str(files[1]), found=expected["mid"]) in text.splitlines()
     assert site.requests == []
     bad = tsttc("compare", EXAMPLES / "broken.json", files[0], "--truth", truth_of_30_recordings)
     assert bad.exit_code == 1
@@ -225,8 +225,8 @@ def test_verify_with_kept_keys_asks_nobody(
 ) -> None:
     keys = tmp_path / "keys.json"
     keys.write_text(json.dumps(RECEIPT_KEYS))
-    said = json.loads(tsttc("verify", receipt, "--keys", keys, "--json").stdout)
-    assert (said["scores"]["mid"], said["edition"], said["split"]) == (13.92, 2, "val")
+    document = json.loads(tsttc("verify", receipt, "--keys", keys, "--json").stdout)
+    assert (document["scores"]["mid"], document["edition"], document["split"]) == (13.92, 2, "val")
     receipt.write_text(RECEIPT[:300] + "A" + RECEIPT[301:])
     forged = tsttc("verify", receipt, "--keys", keys, "--json")
     assert (forged.exit_code, json.loads(forged.stdout)["code"]) == (1, "receipt-altered")

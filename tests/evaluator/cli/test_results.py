@@ -21,8 +21,8 @@ MISSING = {"rank_low": None, "rank_high": None, "is_with_best": None}
 pytestmark = pytest.mark.usefixtures("at_site")
 
 
-def said(tsttc: Tsttc, site: RecordedSite, document: dict[str, Any]) -> list[str]:
-    """What stands between the state and the table."""
+def lines_above(tsttc: Tsttc, site: RecordedSite, document: dict[str, Any]) -> list[str]:
+    """The lines between the state and the table."""
     site.put(GET, Reply(document))
     result = tsttc("status", ID)
     assert (result.exit_code, result.stderr) == (0, "")
@@ -31,7 +31,7 @@ def said(tsttc: Tsttc, site: RecordedSite, document: dict[str, Any]) -> list[str
 
 
 def test_rank_and_errors_come_with_where_they_may_lie(tsttc: Tsttc, site: RecordedSite) -> None:
-    assert said(tsttc, site, SURE) == [
+    assert lines_above(tsttc, site, SURE) == [
         "rank 2 (1–3)",
         "MiD 10.25 (9.60–10.90), RTE 15.25 (9.60–10.90), in brackets the 95 % confidence intervals",
     ]
@@ -53,15 +53,15 @@ def test_rank_and_errors_come_with_where_they_may_lie(tsttc: Tsttc, site: Record
 def test_what_is_not_known_is_left_out(
     tsttc: Tsttc, site: RecordedSite, more: dict[str, Any], expected: list[str]
 ) -> None:
-    assert [line for line in said(tsttc, site, SURE | more) if "rank" in line] == expected
+    assert [line for line in lines_above(tsttc, site, SURE | more) if "rank" in line] == expected
 
 
 def test_server_that_tells_neither_is_no_fault(tsttc: Tsttc, site: RecordedSite) -> None:
-    assert said(tsttc, site, SCORED) == []
+    assert lines_above(tsttc, site, SCORED) == []
 
 
 def test_status_says_that_intervals_are_computed_and_does_not_wait(tsttc: Tsttc, site: RecordedSite) -> None:
-    assert said(tsttc, site, AWAITED) == ["rank 2", "The confidence intervals are being computed."]
+    assert lines_above(tsttc, site, AWAITED) == ["rank 2", "The confidence intervals are being computed."]
     assert len(site.requests) == 1
 
 

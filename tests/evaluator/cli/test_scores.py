@@ -23,12 +23,12 @@ def document(tsttc: Tsttc, *arguments: object) -> Any:
 
 
 def test_groups_stand_in_the_document_of_a_file_and_as_rows_of_its_table(tsttc: Tsttc) -> None:
-    found = document(tsttc, GOOD, "--by", "camera")
-    assert found["by"] == "camera"
-    assert sum(group["n_sequences"] for group in found["groups"]) == found["n_sequences"]
+    report = document(tsttc, GOOD, "--by", "camera")
+    assert report["by"] == "camera"
+    assert sum(group["n_sequences"] for group in report["groups"]) == report["n_sequences"]
     lines = tsttc("score", GOOD, "--truth", TRUTH, "--by", "camera").stdout.splitlines()
     assert lines[0].split()[:3] == ["camera", "MiD", "MiD_c"]
-    assert [line.split()[1] for line in lines[1:4]] == [f"{g['scores']['mid']:.2f}" for g in found["groups"]]
+    assert [line.split()[1] for line in lines[1:4]] == [f"{g['scores']['mid']:.2f}" for g in report["groups"]]
 
 
 def test_several_files_are_rows_of_one_table_and_one_document(tsttc: Tsttc) -> None:
@@ -73,7 +73,7 @@ def test_sequences_are_written_with_true_and_predicted_times(tsttc: Tsttc, tmp_p
     assert "--per-sequence" in away.stderr
 
 
-def test_intervals_that_do_not_exist_are_said_to_be_missing(tsttc: Tsttc) -> None:
+def test_intervals_that_do_not_exist_are_reported_as_missing(tsttc: Tsttc) -> None:
     result = tsttc("score", GOOD, "--truth", TRUTH, "--intervals")
     assert result.exit_code == 0
     assert "There are no confidence intervals: one needs 8 recordings of equal size" in result.stderr
@@ -89,7 +89,7 @@ def test_intervals_that_do_not_exist_are_said_to_be_missing(tsttc: Tsttc) -> Non
         ((GOOD,), "A file is named twice"),
     ],
 )
-def test_what_cannot_be_done_is_said(tsttc: Tsttc, arguments: tuple[object, ...], words: str) -> None:
+def test_what_cannot_be_done_is_refused(tsttc: Tsttc, arguments: tuple[object, ...], words: str) -> None:
     result = tsttc("score", GOOD, "--truth", TRUTH, *arguments)
     assert result.exit_code == 2
     assert words in " ".join(result.stderr.split())

@@ -38,7 +38,7 @@ def paths(site: RecordedSite) -> list[str]:
     return [f"{request.method} {request.path}" for request in site.requests]
 
 
-def test_bad_file_is_told_in_the_words_of_check_and_nothing_is_sent(tsttc: Tsttc, site: RecordedSite) -> None:
+def test_bad_file_gets_the_words_of_check_and_nothing_is_sent(tsttc: Tsttc, site: RecordedSite) -> None:
     put_manifest(site)
     checked = tsttc("check", EXAMPLES / "broken.json", "--manifest", MANIFEST)
     result = submit(tsttc, "broken.json")
@@ -104,7 +104,7 @@ NOTICE = "Foo++ is public: everyone sees its results on every split."
 PUBLIC = {"id": "m1", "name": "Foo++", "visibility": "PUBLIC", "notice": NOTICE}
 
 
-def test_public_method_is_told_to_be_so_before_the_file_is_sent(tsttc: Tsttc, site: RecordedSite) -> None:
+def test_notice_of_a_public_method_is_shown_before_the_file_is_sent(tsttc: Tsttc, site: RecordedSite) -> None:
     put_manifest(site)
     site.put(METHODS, Reply([PUBLIC]))
     result = submit(tsttc)
@@ -128,7 +128,7 @@ def test_a_person_is_asked_before_the_results_of_a_public_method_go_public(
     assert len(site.posts) == 1
 
 
-def test_public_method_is_told_in_json_and_beside_it(tsttc: Tsttc, site: RecordedSite) -> None:
+def test_notice_of_a_public_method_is_in_json_and_on_stderr(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(POST, Reply(QUEUED | {"notice": NOTICE}, status=201))
     site.put(METHODS, Reply([PUBLIC]))
     result = submit(tsttc, "predictions.json", "--json")

@@ -65,11 +65,11 @@ def submit(tsttc: Tsttc, *more: object) -> Result:
     return tsttc("submit", PREDICTIONS, "--split", "val", "--method", "Foo++", *more)
 
 
-def test_submit_sends_what_was_said_and_names_the_submission(tsttc: Tsttc, site: RecordedSite) -> None:
+def test_submit_sends_all_options_and_names_the_submission(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(POST, Reply(QUEUED, status=201))
-    said = {"description": "A test", "paper-url": "https://p.example", "code-url": "https://c.example"}
-    said |= {"note": "third try", "commit": "c0ffee"}
-    result = submit(tsttc, *[part for name, value in said.items() for part in (f"--{name}", value)])
+    options = {"description": "A test", "paper-url": "https://p.example", "code-url": "https://c.example"}
+    options |= {"note": "third try", "commit": "c0ffee"}
+    result = submit(tsttc, *[part for name, value in options.items() for part in (f"--{name}", value)])
     assert (result.exit_code, result.stderr) == (0, "")
     assert result.stdout.splitlines() == [
         f"Submission {ID}  {site.url}/submissions/{ID}/",
@@ -77,7 +77,7 @@ def test_submit_sends_what_was_said_and_names_the_submission(tsttc: Tsttc, site:
     ]
     sent = site.posts[0].parts()
     assert sent.pop("file") == ("predictions.json", PREDICTIONS.read_bytes())
-    expected = {"split": "val", "method": "Foo++"} | {k.replace("-", "_"): v for k, v in said.items()}
+    expected = {"split": "val", "method": "Foo++"} | {k.replace("-", "_"): v for k, v in options.items()}
     assert {name: content.decode() for name, (_, content) in sent.items()} == expected
     assert site.posts[0].headers["Authorization"] == "Bearer secret-token"
     assert site.posts[0].headers["User-Agent"].startswith("tsttc/")
@@ -200,7 +200,7 @@ def test_token_on_an_unencrypted_way_is_warned_of(tsttc: Tsttc, site: RecordedSi
 
 @pytest.mark.parametrize("command", ["submit", "status"])
 @pytest.mark.parametrize("token", ["", "  ", "to ken", "tökén", "a\nb"])
-def test_empty_or_senseless_token_is_told_and_nothing_is_sent(
+def test_empty_or_senseless_token_is_refused_and_nothing_is_sent(
     tsttc: Tsttc, site: RecordedSite, monkeypatch: pytest.MonkeyPatch, command: str, token: str
 ) -> None:
     monkeypatch.setenv("TSTTC_TOKEN", token)
@@ -244,7 +244,7 @@ def test_token_is_no_option(tsttc: Tsttc) -> None:
         (Reply({"hello": "world"}, 200), 3, "Object missing required field"),
     ],
 )
-def test_refusal_is_told_in_plain_words_and_by_whose_fault_it_is(
+def test_refusal_is_explained_in_plain_words_and_by_whose_fault_it_is(
     tsttc: Tsttc, site: RecordedSite, reply: Reply, exit_code: int, words: str
 ) -> None:
     site.put(POST, reply)

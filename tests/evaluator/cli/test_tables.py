@@ -28,8 +28,8 @@ BOARD = {"split": "test", "edition": 2, "entries": []}
 def test_board_in_another_format_is_the_text_of_the_site(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put("GET /api/v1/splits/test/board", Reply(BOARD))
     for form, suffix in (("csv", "csv"), ("latex", "tex"), ("markdown", "md"), ("bibtex", "bib")):
-        found = Reply("@misc{é,\r\n}\r\n".encode(), headers={"Content-Type": "text/plain; charset=utf-8"})
-        site.put(f"GET /board/test/editions/2.{suffix}", found)
+        reply = Reply("@misc{é,\r\n}\r\n".encode(), headers={"Content-Type": "text/plain; charset=utf-8"})
+        site.put(f"GET /board/test/editions/2.{suffix}", reply)
         result = tsttc("board", "--format", form, "--sort", "-mid", "--intervals")
         assert (result.stdout, result.stderr) == ("@misc{é,\n}\n", "")
         assert site.requests[-1].path == f"/board/test/editions/2.{suffix}?sort=-mid&intervals=1"
@@ -48,22 +48,22 @@ def test_ratios_at_any_gap_are_the_seconds_that_they_were_made_of(frame_gap: int
     ratios = ttc_to_scale_ratio(TTC_S, fps_hz=10 / frame_gap)
     flat = write_predictions(manifest=MANIFEST, ttc_s=ratios)  # ratios as a flat file has them
     enveloped = write_predictions(manifest=MANIFEST, scale_ratio=ratios, frame_gap=frame_gap)
-    for found in (
+    for converted in (
         convert(flat, frame_gap=frame_gap),
         convert(flat, fps_hz=10 / frame_gap),
         convert(enveloped),
         convert(convert(enveloped, to="scale_ratio", to_frame_gap=6 - frame_gap)),
         convert(convert(PREDICTIONS, to="scale_ratio", to_fps_hz=7.5)),
     ):
-        back = read_predictions(found, manifest=MANIFEST)
+        back = read_predictions(converted, manifest=MANIFEST)
         np.testing.assert_allclose(back.ttc_s, TTC_S, rtol=1e-9)
         assert back.unit == "ttc"
 
 
 def test_rate_of_each_key_is_its_own() -> None:
     document = {"unit": "scale_ratio", "frame_gap": {"a": 1, "b": 5}, "predictions": {"a": 0.9, "b": 0.9}}
-    found = json.loads(convert(json.dumps(document).encode()))
-    assert found["b"] == pytest.approx(5 * found["a"])
+    converted = json.loads(convert(json.dumps(document).encode()))
+    assert converted["b"] == pytest.approx(5 * converted["a"])
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_rate_of_each_key_is_its_own() -> None:
 def test_what_no_prediction_file_may_hold_is_not_converted(text: str, codes: set[str]) -> None:
     with pytest.raises(Rejected) as caught:
         convert(text.encode())
-    assert {found.code for found in caught.value.problems} == codes
+    assert {problem.code for problem in caught.value.problems} == codes
 
 
 def test_convert_writes_a_file_that_scores_the_same(tsttc: Tsttc, tmp_path: Path) -> None:

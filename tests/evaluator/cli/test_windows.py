@@ -1,4 +1,4 @@
-"""What Windows does otherwise: paths, line ends, byte order marks, the place of settings."""
+"""What Windows does otherwise: paths, line ends, byte order marks, the folder of settings."""
 
 from pathlib import Path
 
@@ -22,8 +22,8 @@ def test_files_saved_by_windows_editors_mean_the_same(tsttc: Tsttc, tmp_path: Pa
     manifest = read_manifest(tmp_path / "manifest.csv")
     assert manifest.digest == read_manifest(EXAMPLES / "manifest.csv").digest
     assert read_truth(tmp_path / "truth.csv").digest == read_truth(EXAMPLES / "truth.csv").digest
-    found = read_predictions(tmp_path / "predictions.json", manifest=manifest)
-    assert (found.ttc_s == read_predictions(EXAMPLES / "predictions.json", manifest=manifest).ttc_s).all()
+    saved = read_predictions(tmp_path / "predictions.json", manifest=manifest)
+    assert (saved.ttc_s == read_predictions(EXAMPLES / "predictions.json", manifest=manifest).ttc_s).all()
     shown = tsttc("score", tmp_path / "predictions.json", "--truth", tmp_path / "truth.csv")
     assert shown.exit_code == 0, shown.stderr
 

@@ -45,7 +45,7 @@ def test_server_that_keeps_cutting_is_reported_after_a_few_tries(
     assert clock.slept_s == sorted(clock.slept_s)
 
 
-def test_one_s_own_method_is_found_on_any_page_and_the_token_goes_nowhere_else(
+def test_one_s_own_method_may_be_on_any_page_and_the_token_goes_nowhere_else(
     client: Client, site: RecordedSite
 ) -> None:
     def page(name: str, following: str) -> Reply:
@@ -56,9 +56,9 @@ def test_one_s_own_method_is_found_on_any_page_and_the_token_goes_nowhere_else(
     # Whatever host the link names, as that of a proxy would: only its question is taken.
     pages = [page("a", "https://elsewhere.example/x?after=1&limit=1"), page("b", "/m?after=2"), page("c", "")]
     site.put("GET /api/v1/methods", *pages)
-    found = client.own_method("c")
-    assert found is not None
-    assert found.id == "id-c"
+    method = client.own_method("c")
+    assert method is not None
+    assert method.id == "id-c"
     paths = [request.path for request in site.requests]
     assert paths == ["/api/v1/methods", "/api/v1/methods?after=1&limit=1", "/api/v1/methods?after=2"]
     assert client.own_method("nowhere") is None
@@ -107,7 +107,7 @@ def test_error_answer_of_any_kind_is_still_a_refusal(client: Client, site: Recor
 
 
 @pytest.mark.parametrize(
-    ("body", "found"),
+    ("body", "shape"),
     [
         (b"<html>hello</html>", "not JSON (application/json)"),
         (b"[1, 2]", "JSON, but no object"),
@@ -116,12 +116,12 @@ def test_error_answer_of_any_kind_is_still_a_refusal(client: Client, site: Recor
     ],
 )
 def test_answer_of_another_shape_is_named(
-    client: Client, site: RecordedSite, body: bytes, found: str
+    client: Client, site: RecordedSite, body: bytes, shape: str
 ) -> None:
     site.put(ONE, Reply(body))
     with pytest.raises(BadAnswer) as caught:
         client.submission("abc")
-    assert caught.value.found == found
+    assert caught.value.found == shape
 
 
 def test_redirect_is_reported_and_not_followed(client: Client, site: RecordedSite) -> None:
@@ -131,7 +131,7 @@ def test_redirect_is_reported_and_not_followed(client: Client, site: RecordedSit
     assert len(site.requests) == 1
 
 
-def test_names_cannot_lead_out_of_their_place_in_the_address(client: Client, site: RecordedSite) -> None:
+def test_names_cannot_lead_out_of_their_part_of_the_address(client: Client, site: RecordedSite) -> None:
     with pytest.raises(Refused):
         client.submission("../splits?x=1#y")
     assert site.requests[0].path == "/api/v1/submissions/..%2Fsplits%3Fx%3D1%23y"

@@ -66,8 +66,8 @@ def test_mid_keeps_its_accuracy_where_the_logarithms_cancel() -> None:
     expected = [
         errors_of_the_toolkit(p, t)["mid"] for p, t in zip(predicted_s.tolist(), true_s.tolist(), strict=True)
     ]
-    found = MID.errors(np.minimum(predicted_s, 20), true_s)
-    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=0)
+    mid = MID.errors(np.minimum(predicted_s, 20), true_s)
+    np.testing.assert_allclose(mid, expected, rtol=1e-12, atol=0)
 
 
 def test_mid_is_nan_where_the_scale_ratio_is_not_positive() -> None:

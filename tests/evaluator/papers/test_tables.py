@@ -14,8 +14,8 @@ def test_every_value_has_a_column_with_a_unit() -> None:
 
 def test_an_ablation_answers_by_method_and_setting() -> None:
     gaps = published_tables().table("ablation-frame-gap")
-    found = [gaps.value(method="pixel-mse", setting=gap, column="mid") for gap in range(1, 6)]
-    assert found == [102.1, 61.2, 46.4, 41.2, 41.0]
+    mids = [gaps.value(method="pixel-mse", setting=gap, column="mid") for gap in range(1, 6)]
+    assert mids == [102.1, 61.2, 46.4, 41.2, 41.0]
 
 
 def test_what_the_paper_did_not_try_has_no_value() -> None:
@@ -27,5 +27,5 @@ def test_what_the_paper_did_not_try_has_no_value() -> None:
 
 def test_an_ablation_of_one_split_does_not_answer_for_another() -> None:
     blur = published_tables().table("ablation-plate-blur")
-    found = [blur.value(method="pixel-mse", setting=True, column="mid", split=s) for s in ("val", "test")]
-    assert found == [41.0, 40.3]
+    mids = [blur.value(method="pixel-mse", setting=True, column="mid", split=s) for s in ("val", "test")]
+    assert mids == [41.0, 40.3]

@@ -24,17 +24,17 @@ MANIFESTS = [SMALL, FIVE_DIGITS, WIDE, HUGE]
 
 
 def reading(data: bytes, manifest: Manifest) -> object:
-    """What the strict reading makes of a file: values and envelope, or the codes of its problems."""
+    """Read a file strictly: its values and envelope, or the codes of its problems."""
     try:
-        found = read_slowly(data, manifest)
+        predictions = read_slowly(data, manifest)
     except Rejected as rejected:
         return sorted({problem.code for problem in rejected.problems})
     return (
-        found.ttc_s.tolist(),
-        found.keys,
-        found.document.unit,
-        found.document.meta,
-        found.document.enveloped,
+        predictions.ttc_s.tolist(),
+        predictions.keys,
+        predictions.document.unit,
+        predictions.document.meta,
+        predictions.document.enveloped,
     )
 
 

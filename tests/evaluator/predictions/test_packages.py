@@ -32,23 +32,23 @@ def table(*columns: str, end: str = "\n", rows: dict[str, list[str]] | None = No
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 @pytest.mark.parametrize("start", [b"", b"\xef\xbb\xbf"])
 def test_a_table_means_what_its_json_means(columns: tuple[str, ...], end: str, start: bytes) -> None:
-    found = read_predictions(start + table(*columns, end=end), manifest=MANIFEST)
-    assert found.ttc_s.tolist() == [1.5, -2.25, 30.0]
-    assert found.keys == ("natural_key" if "ts" in columns else "anno_id")
+    predictions = read_predictions(start + table(*columns, end=end), manifest=MANIFEST)
+    assert predictions.ttc_s.tolist() == [1.5, -2.25, 30.0]
+    assert predictions.keys == ("natural_key" if "ts" in columns else "anno_id")
 
 
 def test_a_table_of_scale_ratios_has_a_rate_for_each_row() -> None:
-    found = read_predictions(table("anno_id", "scale_ratio", "frame_gap"), manifest=MANIFEST)
+    predictions = read_predictions(table("anno_id", "scale_ratio", "frame_gap"), manifest=MANIFEST)
     expected = scale_ratio_to_ttc([0.9, 1.1, 1.0], fps_hz=[2.0, 2.0, 10.0])
-    assert found.ttc_s.tolist() == expected.tolist()
-    assert found.unit == "scale_ratio"
+    assert predictions.ttc_s.tolist() == expected.tolist()
+    assert predictions.unit == "scale_ratio"
 
 
 def test_gzip_is_unpacked_all_its_members_and_named_by_the_bytes_that_were_sent() -> None:
     for data in (gzip.compress(GOOD), gzip.compress(GOOD[:9]) + gzip.compress(GOOD[9:])):
-        found = read_predictions(data, manifest=MANIFEST)
-        assert found.ttc_s.tolist() == [1.5, -2.25, 30.0]
-        assert found.digest == sha256_digest(data)
+        predictions = read_predictions(data, manifest=MANIFEST)
+        assert predictions.ttc_s.tolist() == [1.5, -2.25, 30.0]
+        assert predictions.digest == sha256_digest(data)
     assert convert(gzip.compress(GOOD)) == convert(GOOD)
     assert read_predictions(gzip.compress(table("anno_id", "ttc")), manifest=MANIFEST).ttc_s[0] == 1.5
 
@@ -72,7 +72,7 @@ def test_gzip_is_unpacked_all_its_members_and_named_by_the_bytes_that_were_sent(
         (b"anno_id,ttc\n0,\xff\n", "not-utf8", "Byte 14 of the table is not UTF-8", "byte 14"),
     ],
 )
-def test_what_cannot_be_read_is_said_in_words(data: bytes, code: str, words: str, where: str) -> None:
+def test_what_cannot_be_read_is_refused_in_words(data: bytes, code: str, words: str, where: str) -> None:
     with pytest.raises(Rejected) as caught:
         read_predictions(data, manifest=MANIFEST)
     [problem] = caught.value.problems
@@ -107,7 +107,7 @@ def test_members_may_be_longer_than_what_is_read_at_once_and_have_zeros_between(
     assert refusal(gzip.compress(long)[:-1]).message.endswith("it ends too early.")
 
 
-def test_an_archive_of_too_many_members_is_refused_with_the_place_of_the_first_too_many() -> None:
+def test_an_archive_of_too_many_members_is_refused_with_the_byte_of_the_first_too_many() -> None:
     empty = gzip.compress(b"", mtime=0)
     good = gzip.compress(GOOD) + empty * (loading.MAX_GZIP_MEMBERS - 1)
     assert read_predictions(good, manifest=MANIFEST).ttc_s[0] == 1.5

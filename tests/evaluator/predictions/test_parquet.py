@@ -38,9 +38,9 @@ GOOD = table(anno_id=IDS, note=["x"] * len(IDS), ttc=VALUES)
 
 def test_a_table_is_what_its_json_is() -> None:
     sent = asking.as_sent(GOOD)
-    found = read_predictions(GOOD, manifest=MANIFEST)
-    assert found.ttc_s.tolist() == VALUES
-    assert found.digest == sha256_digest(sent) == read_sent(sent, manifest=MANIFEST).digest
+    predictions = read_predictions(GOOD, manifest=MANIFEST)
+    assert predictions.ttc_s.tolist() == VALUES
+    assert predictions.digest == sha256_digest(sent) == read_sent(sent, manifest=MANIFEST).digest
     assert convert(GOOD) == convert(flat(VALUES))
     assert asking.as_sent(sent) is sent
 
@@ -90,7 +90,7 @@ FAULTS: dict[str, tuple[bytes, str, str, str]] = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_what_cannot_be_read_is_said_in_words(name: str) -> None:
+def test_what_cannot_be_read_is_refused_in_words(name: str) -> None:
     data, code, words, where = FAULTS[name]
     with pytest.raises(Rejected) as caught:
         asking.as_sent(data)
@@ -107,9 +107,9 @@ def test_two_columns_of_one_name_are_refused() -> None:
 
 
 def test_the_server_reads_no_parquet_and_says_what_to_do() -> None:
-    said = answer(GOOD, manifest=MANIFEST).decode()
-    assert '"verdict": "rejected"' in said
-    assert "The file looks like a Parquet table; tsttc submit sends one, and tsttc convert makes JSON" in said
+    text = answer(GOOD, manifest=MANIFEST).decode()
+    assert '"verdict": "rejected"' in text
+    assert "The file looks like a Parquet table; tsttc submit sends one, and tsttc convert makes JSON" in text
     assert json_of(GOOD) == GOOD
 
 
@@ -119,13 +119,13 @@ def test_a_machine_without_pyarrow_says_what_to_install(
     monkeypatch.setattr(asking, "find_spec", lambda _name: None)
     path = tmp_path / "mine.parquet"
     path.write_bytes(GOOD)
-    told = tsttc("check", path, "--manifest", EXAMPLES / "manifest.csv")
-    assert (told.exit_code, told.stdout) == (2, "")
-    assert "mine.parquet, a Parquet table, needs pyarrow, which is not installed." in told.stderr
-    assert told.stderr.endswith("Install it with: pip install pyarrow\n")
+    refused = tsttc("check", path, "--manifest", EXAMPLES / "manifest.csv")
+    assert (refused.exit_code, refused.stdout) == (2, "")
+    assert "mine.parquet, a Parquet table, needs pyarrow, which is not installed." in refused.stderr
+    assert refused.stderr.endswith("Install it with: pip install pyarrow\n")
 
 
 def test_tables_of_results_keep_numbers_texts_and_what_is_missing() -> None:
     rows: list[dict[str, object]] = [{"a": 1.5, "b": "x"}, {"a": None, "b": "=y"}]
-    found = pq.read_table(io.BytesIO(parquet_of(rows, columns=["a", "b"])))
-    assert found.to_pylist() == rows
+    written = pq.read_table(io.BytesIO(parquet_of(rows, columns=["a", "b"])))
+    assert written.to_pylist() == rows

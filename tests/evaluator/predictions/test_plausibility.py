@@ -29,10 +29,10 @@ def predicted(truth: GroundTruth, ttc_s: Floats) -> Predictions:
 
 
 def codes(truth: GroundTruth, ttc_s: Floats) -> tuple[list[str], list[str]]:
-    """Without the truth, and with it."""
-    found = predicted(truth, ttc_s)
-    told = [warning.code for warning in warnings_of(found)]
-    return told, [warning.code for warning in warnings_with_truth(found, truth)]
+    """Codes of the warnings without the truth, and with it."""
+    predictions = predicted(truth, ttc_s)
+    without_truth = [warning.code for warning in warnings_of(predictions)]
+    return without_truth, [warning.code for warning in warnings_with_truth(predictions, truth)]
 
 
 def with_noise(ttc_s: Floats, sigma: float) -> Floats:
@@ -48,14 +48,14 @@ def test_shuffled_values_are_warned_of(driven: GroundTruth) -> None:
     assert codes(driven, RNG.permutation(driven.ttc_s)) == (["shuffled-values"], ["unlike-truth"])
 
 
-def test_signs_of_the_other_convention_are_said_to_be_that(driven: GroundTruth) -> None:
+def test_signs_of_the_other_convention_are_reported_as_that(driven: GroundTruth) -> None:
     assert codes(driven, -driven.ttc_s) == ([], ["unlike-truth"])
     [warning] = warnings_with_truth(predicted(driven, -driven.ttc_s), driven)
     assert "rank correlation is -1.00, and 100 % have the opposite sign" in warning.message
     assert warning.message.endswith("Probably every sign is wrong: τ is negative when the object moves away.")
 
 
-def test_milliseconds_are_told_from_seconds_by_every_command(driven: GroundTruth) -> None:
+def test_milliseconds_are_distinguished_from_seconds_by_every_command(driven: GroundTruth) -> None:
     assert codes(driven, 1000 * driven.ttc_s) == (["not-seconds"], ["not-seconds"])
     [warning] = warnings_of(predicted(driven, 1000 * driven.ttc_s))
     n = f"{driven.n_sequences:,}"
@@ -64,7 +64,7 @@ def test_milliseconds_are_told_from_seconds_by_every_command(driven: GroundTruth
     )
 
 
-def test_scale_ratios_without_their_unit_are_told_from_seconds(driven: GroundTruth) -> None:
+def test_scale_ratios_without_their_unit_are_distinguished_from_seconds(driven: GroundTruth) -> None:
     # Without the two values in a hundred that leave the range.
     ratios = np.clip(1 / (1 + 1 / (2 * driven.ttc_s)), 0.55, 1.45)
     assert {"looks-like-ratios"} <= set(codes(driven, ratios)[0])
@@ -155,9 +155,9 @@ def test_estimators_of_real_driving_are_not_warned_of_and_their_shuffled_values_
     ttc_s = read_predictions(data, manifest=read_manifest(kitti / "truth.csv")).ttc_s[rows]
     assert codes(truth, ttc_s) == ([], [])
     assert [warning.code for warning in warnings_of(predicted(truth, -ttc_s))] == ["flipped-signs"]
-    found = roughness(truth.manifest, ttc_s)
-    assert found is not None
-    assert found < 0.6 < MAX_ROUGHNESS
+    in_order = roughness(truth.manifest, ttc_s)
+    assert in_order is not None
+    assert in_order < 0.6 < MAX_ROUGHNESS
     recording = truth.manifest.recording_index
     backwards = np.concatenate([np.flatnonzero(recording == index) for index in reversed(range(11))])
     for order in (RNG.permutation(len(rows)), backwards):

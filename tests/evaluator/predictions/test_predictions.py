@@ -1,4 +1,4 @@
-"""What a prediction file may say, and that it then means what it says."""
+"""What a prediction file may contain, and which predictions it means."""
 
 import json
 import math
@@ -23,9 +23,9 @@ def manifest() -> Manifest:
 
 
 def read(data: bytes, manifest: Manifest) -> list[float]:
-    found = read_predictions(data, manifest=manifest).ttc_s
-    assert found.dtype == np.float64
-    return list(found.tolist())
+    ttc_s = read_predictions(data, manifest=manifest).ttc_s
+    assert ttc_s.dtype == np.float64
+    return list(ttc_s.tolist())
 
 
 def test_natural_keys_name_the_target_frame(manifest: Manifest) -> None:
@@ -112,7 +112,7 @@ def test_arrays_make_predictions_without_a_file(manifest: Manifest) -> None:
 
 
 @pytest.mark.parametrize("name", ["flat", "envelope", "natural"])
-def test_a_place_in_the_file_is_a_json_pointer(manifest: Manifest, name: str, tmp_path: Path) -> None:
+def test_a_position_in_the_file_is_a_json_pointer(manifest: Manifest, name: str, tmp_path: Path) -> None:
     members = (
         dict(zip(manifest.natural_keys, TTC_S, strict=True)) if name == "natural" else dict(enumerate(TTC_S))
     )

@@ -1,4 +1,4 @@
-"""Every fault of a prediction file: its code, its place, its words. Wording is part of the interface."""
+"""Every fault of a prediction file: its code, its pointer, its words. Wording is part of the interface."""
 
 import tracemalloc
 
@@ -19,11 +19,11 @@ def rejection(data: bytes, *, manifest: Manifest = MANIFEST, max_bytes: int | No
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_faulty_file_is_rejected_in_these_words(name: str) -> None:
-    data, *problem = CASES[name]
+    data, *expected = CASES[name]
     with pytest.raises(Rejected) as rejected:
         read_sent(data, manifest=MANIFEST)
-    assert rejected.value.problems[0] == Problem(*problem)
-    assert all(found.code in PROBLEM_CODES for found in rejected.value.problems)
+    assert rejected.value.problems[0] == Problem(*expected)
+    assert all(problem.code in PROBLEM_CODES for problem in rejected.value.problems)
 
 
 def test_a_file_over_the_limit_is_not_looked_at() -> None:
@@ -31,7 +31,7 @@ def test_a_file_over_the_limit_is_not_looked_at() -> None:
     assert problem == Problem("too-large", "The file has 101 bytes; expected at most 100.")
 
 
-def test_all_faults_are_told_at_once() -> None:
+def test_all_faults_are_reported_at_once() -> None:
     rejected = rejection(b'{"0": NaN, "1": 0, "2": "x", "7": null, "1": 2}')
     assert [(problem.code, problem.where) for problem in rejected.problems] == [
         ("unknown-keys", "/7"),

@@ -74,11 +74,11 @@ def test_the_interval_of_one_group_of_all_is_the_board_s(
 @pytest.mark.parametrize("by", OBJECTS)
 def test_a_truth_without_the_column_says_which_one(by: str, truth: GroundTruth) -> None:
     bare = GroundTruth(truth.manifest, truth.ttc_s, truth.digest)
-    found = evaluate(
+    evaluated = evaluate(
         Predictions.from_arrays(ttc_s=truth.ttc_s, manifest=truth.manifest), bare, keep_sequences=True
     )
     with pytest.raises(ValueError, match=r"The ground truth does not state .*; expected a table with"):
-        found.breakdown(by)
+        evaluated.breakdown(by)
 
 
 def test_a_report_without_sequences_says_how_to_get_them(

@@ -13,16 +13,16 @@ def test_the_factor_is_that_of_a_plain_loop() -> None:
     counts = rng.integers(20, 60, 30).astype(float)
     sums = counts * (20 + np.repeat(rng.normal(0, 3, 10), 3) + rng.normal(0, 2, 30))
     days = units_of([f"r{i:02d}" for i in range(30)], given={f"r{i:02d}": f"d{i // 3}" for i in range(30)})
-    found = dependence(sums, counts, days, rng=rng)
-    assert found is not None
-    assert found.p < 0.05
+    effect = dependence(sums, counts, days, rng=rng)
+    assert effect is not None
+    assert effect.p < 0.05
     rests = sums - sums.sum() / counts.sum() * counts
     by_day = [range(3 * day, 3 * day + 3) for day in range(10)]
     square = sum(u**2 for u in rests)
     pairs = [(g, h) for day in by_day for g in day for h in day if g != h]
     products, sizes = sum(rests[g] * rests[h] for g, h in pairs), sum(counts[g] * counts[h] for g, h in pairs)
-    assert found.se_factor == pytest.approx((sum(rests[list(d)].sum() ** 2 for d in by_day) / square) ** 0.5)
-    assert found.correlation == pytest.approx(products / sizes / (square / (counts**2).sum()))
+    assert effect.se_factor == pytest.approx((sum(rests[list(d)].sum() ** 2 for d in by_day) / square) ** 0.5)
+    assert effect.correlation == pytest.approx(products / sizes / (square / (counts**2).sum()))
 
 
 def test_where_every_unit_is_one_recording_or_nothing_differs_there_is_no_factor() -> None:

@@ -16,8 +16,8 @@ def test_p_is_that_of_scipys_permutation_test() -> None:
     for shift in (0.0, 0.3, 0.6):
         gaps = rng.normal(shift, 1, 30)
         expected = permutation_p(gaps, n_resamples=9_999)
-        found = sign_flip_p(gaps[:, None], rng=np.random.default_rng(1))[0]
-        assert found == pytest.approx(expected, abs=0.015)
+        p = sign_flip_p(gaps[:, None], rng=np.random.default_rng(1))[0]
+        assert p == pytest.approx(expected, abs=0.015)
 
 
 # --- the interval ----------------------------------------------------------------------------------------
@@ -49,11 +49,11 @@ def test_p_and_interval_are_those_of_a_plain_loop(shift: int, n_flips: int) -> N
     counts = rng.integers(0, 30, (24, 3)).astype(float)
     counts[:9, 2] = 0
     gaps = rng.integers(-90 + shift * 5, 100 + shift * 5, counts.shape) * (counts > 0)
-    found = sign_flips(gaps.astype(float), counts, rng=np.random.default_rng(7), n_flips=n_flips)
+    flipped = sign_flips(gaps.astype(float), counts, rng=np.random.default_rng(7), n_flips=n_flips)
     for column in range(3):
         p, low, high = by_a_loop(gaps[:, column], counts[:, column], seed=7, n_flips=n_flips)
-        assert found.p[column] == p
-        assert (found.low[column], found.high[column]) == (low, high)
+        assert flipped.p[column] == p
+        assert (flipped.low[column], flipped.high[column]) == (low, high)
 
 
 def some_gaps(kind: str, rng: np.random.Generator) -> tuple[Floats, Floats]:
@@ -78,11 +78,11 @@ def test_0_is_outside_the_interval_exactly_where_p_is_below_5_percent(kind: str)
     for seed in range(6):
         gaps, counts = some_gaps(kind, np.random.default_rng([seed, len(kind)]))
         for n_flips in (499, 1_999):
-            found = sign_flips(gaps, counts, rng=np.random.default_rng(seed), n_flips=n_flips)
-            is_outside = (found.low > 0) | (found.high < 0)
-            assert (is_outside == (found.p < 0.05)).all()
+            flipped = sign_flips(gaps, counts, rng=np.random.default_rng(seed), n_flips=n_flips)
+            is_outside = (flipped.low > 0) | (flipped.high < 0)
+            assert (is_outside == (flipped.p < 0.05)).all()
             p = sign_flip_p(gaps, rng=np.random.default_rng(seed), n_flips=n_flips)
-            assert (p == found.p).all(), "whatever the counts are"
+            assert (p == flipped.p).all(), "whatever the counts are"
             n_significant += int(is_outside.sum())
             n_not += int((~is_outside).sum())
     assert n_significant >= 10
@@ -92,19 +92,19 @@ def test_0_is_outside_the_interval_exactly_where_p_is_below_5_percent(kind: str)
 def test_the_interval_holds_exactly_what_the_same_test_does_not_reject() -> None:
     gaps, counts = some_gaps("integers", np.random.default_rng(5))
     gaps, counts = gaps[:, :1], counts[:, :1]
-    found = sign_flips(gaps, counts, rng=np.random.default_rng(0))
-    for end, outwards in ((found.low[0], -1), (found.high[0], 1)):
-        for step, is_held in ((1e-6, False), (-1e-6, True)):
+    flipped = sign_flips(gaps, counts, rng=np.random.default_rng(0))
+    for end, outwards in ((flipped.low[0], -1), (flipped.high[0], 1)):
+        for step, is_inside in ((1e-6, False), (-1e-6, True)):
             shifted = gaps - (end + outwards * step) * counts
             p = sign_flip_p(shifted, rng=np.random.default_rng(0))[0]
-            assert (p >= 0.05) == is_held
+            assert (p >= 0.05) == is_inside
 
 
 def test_few_recordings_exclude_no_difference() -> None:
     gaps = np.array([[3.0], [4.0], [5.0], [6.0]])
-    found = sign_flips(gaps, np.ones_like(gaps), rng=np.random.default_rng(0))
-    assert (found.low[0], found.high[0]) == (-np.inf, np.inf)
-    assert found.p[0] > 0.05
+    flipped = sign_flips(gaps, np.ones_like(gaps), rng=np.random.default_rng(0))
+    assert (flipped.low[0], flipped.high[0]) == (-np.inf, np.inf)
+    assert flipped.p[0] > 0.05
     nothing = sign_flips(np.zeros((30, 1)), np.zeros((30, 1)), rng=np.random.default_rng(0))
     assert (nothing.p[0], nothing.low[0], nothing.high[0]) == (1.0, -np.inf, np.inf)
 
@@ -126,28 +126,28 @@ def test_what_is_published_says_the_same_of_0_as_p(
 ) -> None:
     gap, low, high = scale * gap, scale * (gap - below), scale * (gap + above)
     p = 0.0496 if low > 0 or high < 0 else 0.05
-    found = rounded_difference(
+    rounded = rounded_difference(
         Difference(gap, low, high, p), first=first + gap, second=first, decimals=decimals
     )
-    assert found.low <= found.difference <= found.high
-    assert found.is_significant == (found.low > 0 or found.high < 0)
-    assert found.difference == pytest.approx(round(first + gap, decimals) - round(first, decimals))
-    if found.difference == 0:
-        assert (found.p, found.p_below) == (1.0, 1.0)
+    assert rounded.low <= rounded.difference <= rounded.high
+    assert rounded.is_significant == (rounded.low > 0 or rounded.high < 0)
+    assert rounded.difference == pytest.approx(round(first + gap, decimals) - round(first, decimals))
+    if rounded.difference == 0:
+        assert (rounded.p, rounded.p_below) == (1.0, 1.0)
     else:
-        assert (found.p, found.p_below) == (p, 0.05 if p < 0.05 else 1.0)
-        assert abs(found.low - low) <= 10**-decimals + 1e-9 or found.low == found.difference
-        assert abs(found.high - high) <= 10**-decimals + 1e-9 or found.high == found.difference
+        assert (rounded.p, rounded.p_below) == (p, 0.05 if p < 0.05 else 1.0)
+        assert abs(rounded.low - low) <= 10**-decimals + 1e-9 or rounded.low == rounded.difference
+        assert abs(rounded.high - high) <= 10**-decimals + 1e-9 or rounded.high == rounded.difference
 
 
-def test_what_is_detectable_is_found_four_times_in_five() -> None:
+def test_a_detectable_difference_is_significant_four_times_in_five() -> None:
     rng = np.random.default_rng(4)
     counts = np.full((100, 200), 10.0)
     noise = 10 * rng.normal(0, 1, counts.shape)
-    found = sign_flips(noise, counts, rng=rng, n_flips=999)
+    flipped = sign_flips(noise, counts, rng=rng, n_flips=999)
     detectable = [
         Difference(0.0, low, high, 1.0).detectable_difference
-        for low, high in zip(found.low, found.high, strict=True)
+        for low, high in zip(flipped.low, flipped.high, strict=True)
     ]
     shift = float(np.mean([value for value in detectable if value is not None]))
     again = 10 * rng.normal(shift, 1, counts.shape)
@@ -161,18 +161,18 @@ def test_what_is_detectable_is_found_four_times_in_five() -> None:
 def test_comparing_two_files_is_paired_symmetric_and_repeatable() -> None:
     truth = world(12)
     first, second = predictions(truth, 1), predictions(truth, 2, noise=0.3)
-    found = compare_predictions(first, second, truth, decimals=None)
-    assert found == compare_predictions(first, second, truth, decimals=None)
+    differences = compare_predictions(first, second, truth, decimals=None)
+    assert differences == compare_predictions(first, second, truth, decimals=None)
     means = [evaluate(each, truth).flat() for each in (first, second)]
     turned = compare_predictions(second, first, truth, decimals=None)
-    for name, gap in found.items():
+    for name, gap in differences.items():
         assert gap.difference == pytest.approx(means[0][name] - means[1][name], rel=1e-9)
         assert (gap.low is None) == (gap.p is None) == (gap.n_effective < 8)
         if gap.p is not None:
             assert gap.low <= gap.difference <= gap.high
             assert turned[name].turned() == gap
     own = [confidence_intervals(each, truth)["mid"] or (0.0, 0.0) for each in (first, second)]
-    assert found["mid"].high - found["mid"].low < sum(high - low for low, high in own)
+    assert differences["mid"].high - differences["mid"].low < sum(high - low for low, high in own)
 
 
 def test_two_files_are_compared_as_a_board_publishes_it() -> None:

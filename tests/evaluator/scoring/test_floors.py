@@ -15,13 +15,13 @@ def test_the_floor_is_the_mean_error_of_truncation_by_a_plain_loop() -> None:
     truth = make_truth(TIMES_S)
     kept = [max(-20.0, min(20.0, tau)) for tau in TIMES_S]
     kept[4], kept[5] = -0.15, 0.05
-    found = floor_of(truth)
+    floor = floor_of(truth)
     errors = [errors_of_the_toolkit(p, t) for p, t in zip(kept, TIMES_S, strict=True)]
     for metric in ("mid", "rte"):
-        assert found[metric] == pytest.approx(np.mean([each[metric] for each in errors]), rel=1e-9)
-    inside = {name: value for name, value in found.items() if name.endswith(("small", "large"))}
+        assert floor[metric] == pytest.approx(np.mean([each[metric] for each in errors]), rel=1e-9)
+    inside = {name: value for name, value in floor.items() if name.endswith(("small", "large"))}
     assert set(inside.values()) == {0.0}
-    assert list(found) == list(SCORE_NAMES)
+    assert list(floor) == list(SCORE_NAMES)
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)

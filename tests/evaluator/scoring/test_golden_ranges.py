@@ -35,13 +35,13 @@ def board(*, n_entries: int, n_recordings: int, n_columns: int, step: float, n_q
     return rank_ranges(sums, published=published, usable=usable, rng=signs, quoted=quoted)
 
 
-def digest(found: RankRanges) -> str:
-    """Of both ends of all ranges."""
-    return hashlib.sha256(np.stack([found.low, found.high]).astype("<i8").tobytes()).hexdigest()
+def digest(ranges: RankRanges) -> str:
+    """Digest of both ends of all ranges."""
+    return hashlib.sha256(np.stack([ranges.low, ranges.high]).astype("<i8").tobytes()).hexdigest()
 
 
 @pytest.mark.parametrize("case", GOLDEN, ids=lambda case: case["board"]["n_entries"])
 def test_ranges_are_those_of_the_program_that_kept_all_pairs(case: dict[str, dict[str, int]]) -> None:
-    found = board(**case["board"])  # type: ignore[arg-type]  # as they are recorded
-    assert [found.low[:9, 0].tolist(), found.high[:9, 0].tolist()] == case["first"]
-    assert digest(found) == case["digest"]
+    ranges = board(**case["board"])  # type: ignore[arg-type]  # as they are recorded
+    assert [ranges.low[:9, 0].tolist(), ranges.high[:9, 0].tolist()] == case["first"]
+    assert digest(ranges) == case["digest"]

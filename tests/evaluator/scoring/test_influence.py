@@ -1,4 +1,4 @@
-"""On how few recordings a difference rests, against all ways of leaving some out."""
+"""The number of recordings that a difference rests on, against all ways of leaving some out."""
 
 import itertools
 
@@ -15,7 +15,7 @@ N_FLIPS = 499
 
 
 def fewest(gaps: Floats, counts: Floats, *, seed: int) -> tuple[int | None, int | None]:
-    """By trying everything: the fewest recordings without which p is not small, and the sign another one."""
+    """Try all sets of recordings: the fewest without which p is not small, and the sign turns."""
     total = gaps.sum()
     test_seed = int(np.random.default_rng(seed).integers(2**63 - 1))
     undecided = turned = None
@@ -40,48 +40,48 @@ def test_the_fewest_recordings_are_those_of_trying_everything(seed: int) -> None
     rng = np.random.default_rng(seed)
     counts = rng.integers(1, 20, 11).astype(float)
     gaps = counts * rng.normal(0.9 if seed % 2 else -0.9, 1.0, 11)
-    found = influence(gaps, counts, rng=np.random.default_rng(seed), n_flips=N_FLIPS)
+    measured = influence(gaps, counts, rng=np.random.default_rng(seed), n_flips=N_FLIPS)
     undecided, turned = fewest(gaps, counts, seed=seed)
-    assert found.n_units == 11
-    assert found.n_to_turn == turned, "for the sign, no other choice needs fewer"
-    if found.n_to_undecided is None:
+    assert measured.n_units == 11
+    assert measured.n_to_turn == turned, "for the sign, no other choice needs fewer"
+    if measured.n_to_undecided is None:
         assert sign_flips(gaps[:, None], counts[:, None], rng=np.random.default_rng(1)).p[0] > 0.04
     else:
         assert undecided is not None
-        assert undecided <= found.n_to_undecided <= undecided + 1, "the order makes an upper bound"
+        assert undecided <= measured.n_to_undecided <= undecided + 1, "the order makes an upper bound"
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_difference_stops_being_significant_before_it_turns(seed: int) -> None:
-    """Without many more the other entry would be significantly better: that is not what is looked for."""
+    """Count to an undecided difference; until the other entry is significantly better takes many more."""
     rng = np.random.default_rng(seed)
     gaps = rng.normal(0.3, 1.0, 300)
-    found = influence(gaps, np.ones(300), rng=rng, n_flips=N_FLIPS)
-    assert found.n_to_undecided is not None
-    assert found.n_to_turn is not None
-    assert found.n_to_undecided < found.n_to_turn < 100
-    rest = np.sort(gaps)[: 300 - found.n_to_undecided]
+    measured = influence(gaps, np.ones(300), rng=rng, n_flips=N_FLIPS)
+    assert measured.n_to_undecided is not None
+    assert measured.n_to_turn is not None
+    assert measured.n_to_undecided < measured.n_to_turn < 100
+    rest = np.sort(gaps)[: 300 - measured.n_to_undecided]
     p = sign_flips(rest[:, None], np.ones((len(rest), 1)), rng=rng, n_flips=9_999).p[0]
     assert p == pytest.approx(0.05, abs=0.03)
 
 
 def test_what_is_not_significant_has_a_sign_alone() -> None:
     gaps = np.array([3.0, -1, -1, -0.5] + [0.1, -0.1] * 8)
-    found = influence(gaps, np.ones(20), rng=np.random.default_rng(0), n_flips=N_FLIPS)
-    assert found == Influence(n_units=20, n_to_undecided=None, n_to_turn=1)
+    measured = influence(gaps, np.ones(20), rng=np.random.default_rng(0), n_flips=N_FLIPS)
+    assert measured == Influence(n_units=20, n_to_undecided=None, n_to_turn=1)
 
 
 def test_two_files_are_compared_with_what_their_difference_rests_on() -> None:
     truth = world(3)
     near, far = (predictions(truth, 1, noise=noise) for noise in (0.1, 0.4))
-    found = compare_predictions(near, far, truth)
-    (known,) = (gap.influence for name, gap in found.items() if name == "mid")
+    differences = compare_predictions(near, far, truth)
+    (known,) = (gap.influence for name, gap in differences.items() if name == "mid")
     assert known is not None
     assert known.n_units == 40
     assert 0 < (known.n_to_undecided or 0) <= (known.n_to_turn or 41)
-    assert all(gap.influence is None for name, gap in found.items() if name != "mid")
+    assert all(gap.influence is None for name, gap in differences.items() if name != "mid")
     turned = compare_predictions(far, near, truth)["mid"]
     assert turned.influence == known
-    assert found["mid"].turned().influence == known
-    assert "recordings that favour near most" in sentences.influence("near", "far", found=found["mid"])
+    assert differences["mid"].turned().influence == known
+    assert "recordings that favour near most" in sentences.influence("near", "far", found=differences["mid"])
     assert "recordings that favour near most" in sentences.influence("far", "near", found=turned)

@@ -24,14 +24,14 @@ def quoted_of(papers: Papers, counts: Floats) -> Quoted:
 def ranges_of(sums: Floats, counts: Floats, papers: Papers | None = None) -> list[tuple[int, int, bool]]:
     """Low, high and whether it is with the best, of the only column."""
     published = np.round(sums.sum(axis=1) / counts.sum(axis=0), 2)
-    found = rank_ranges(
+    computed = rank_ranges(
         sums,
         published=published,
         usable=np.ones(1, dtype=bool),
         rng=np.random.default_rng(5),
         quoted=quoted_of(papers, counts) if papers else None,
     )
-    columns = (found.low[:, 0], found.high[:, 0], found.is_with_best[:, 0])
+    columns = (computed.low[:, 0], computed.high[:, 0], computed.is_with_best[:, 0])
     return [(int(a), int(b), bool(c)) for a, b, c in zip(*columns, strict=True)]
 
 
@@ -40,8 +40,8 @@ def ranges_of_a_loop(
 ) -> list[tuple[int, int, bool]]:
     """Step-down max-t over all ordered pairs, one after the other, as the paper has it.
 
-    A quoted row is an entry of its upper end for whoever may be worse, of its lower end for whoever may be
-    better; two of them are no pair.
+    A quoted row counts with its lower end where it may be worse, with its upper end where it may be better;
+    two quoted rows are no pair.
     """
     values = np.round(sums.sum(axis=1) / counts.sum(axis=0), 2)[:, 0]
     names = [*range(len(sums)), *(f"paper {i}" for i in range(len(papers or [])))]
@@ -67,11 +67,11 @@ def ranges_of_a_loop(
     for _ in range(n_steps):
         largest = np.max([draws[pair] for pair in family], axis=0)
         critical = np.quantile(largest, 0.95, method="higher")
-        found = {pair for pair in family if t[pair] > critical}
-        if not found:
+        newly_rejected = {pair for pair in family if t[pair] > critical}
+        if not newly_rejected:
             break
-        rejected |= found
-        family -= found
+        rejected |= newly_rejected
+        family -= newly_rejected
     lows = [1 + sum((own, other) in rejected for other in names) for own in range(len(sums))]
     highs = [len(names) - sum((other, own) in rejected for other in names) for own in range(len(sums))]
     return [(low, high, low == 1) for low, high in zip(lows, highs, strict=True)]
@@ -121,7 +121,7 @@ def test_a_boards_rank_lies_in_its_range_among_quoted_rows(seed: int, step: floa
         assert low <= rank <= high
 
 
-def test_values_that_are_published_alike_are_never_told_apart() -> None:
+def test_values_that_are_published_alike_are_never_distinguished() -> None:
     sums, counts = some_sums(24, n_entries=1)
     value = float(sums.sum() / counts.sum())
     nudged = sums + (0.003 if round(value + 0.003, 2) == round(value, 2) else -0.003) * counts
@@ -133,14 +133,14 @@ def test_who_lacks_a_value_has_no_range_and_is_in_nobodys() -> None:
     published = sums.sum(axis=1) / counts.sum(axis=0)
     published[2] = np.nan
     usable = np.ones(1, dtype=bool)
-    found = rank_ranges(sums, published=published, usable=usable, rng=np.random.default_rng(5))
-    assert (found.low[2, 0], found.high[2, 0], bool(found.is_with_best[2, 0])) == (0, 0, False)
+    computed = rank_ranges(sums, published=published, usable=usable, rng=np.random.default_rng(5))
+    assert (computed.low[2, 0], computed.high[2, 0], bool(computed.is_with_best[2, 0])) == (0, 0, False)
     others = np.delete(sums, 2, axis=0)
     expected = rank_ranges(
         others, published=np.delete(published, 2, axis=0), usable=usable, rng=np.random.default_rng(5)
     )
-    assert np.delete(found.low, 2).tolist() == expected.low[:, 0].tolist()
-    assert np.delete(found.high, 2).tolist() == expected.high[:, 0].tolist()
+    assert np.delete(computed.low, 2).tolist() == expected.low[:, 0].tolist()
+    assert np.delete(computed.high, 2).tolist() == expected.high[:, 0].tolist()
     nobody = rank_ranges(sums, published=published * np.nan, usable=usable, rng=np.random.default_rng(5))
     assert not nobody.high.any()
 
@@ -160,8 +160,8 @@ def test_ranges_and_p_do_not_depend_on_order_or_scale(
     usable = np.ones(1, dtype=bool)
 
     def ranges(sums: Floats, published: Floats) -> list[list[int]]:
-        found = rank_ranges(sums, published=published, usable=usable, rng=np.random.default_rng(5))
-        return [found.low[:, 0].tolist(), found.high[:, 0].tolist()]
+        computed = rank_ranges(sums, published=published, usable=usable, rng=np.random.default_rng(5))
+        return [computed.low[:, 0].tolist(), computed.high[:, 0].tolist()]
 
     low, high = ranges(sums, published)
     assert ranges(sums[order], published[order]) == [[low[i] for i in order], [high[i] for i in order]]

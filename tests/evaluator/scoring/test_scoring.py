@@ -156,11 +156,11 @@ def test_the_same_manifest_in_another_row_order_is_realigned() -> None:
     other = GroundTruth.from_table(table)
     assert other.digest == truth.digest
     expected = evaluate(given_values(truth, [5.0, 8.0, 3.0]), truth, keep_sequences=True)
-    found = evaluate(given_values(other, [3.0, 8.0, 5.0]), truth, keep_sequences=True)
-    assert found.scores == expected.scores
-    assert found.sequences is not None
+    reordered = evaluate(given_values(other, [3.0, 8.0, 5.0]), truth, keep_sequences=True)
+    assert reordered.scores == expected.scores
+    assert reordered.sequences is not None
     assert expected.sequences is not None
-    assert found.sequences["mid"].tolist() == expected.sequences["mid"].tolist()
+    assert reordered.sequences["mid"].tolist() == expected.sequences["mid"].tolist()
 
 
 def test_score_names_are_the_papers_columns() -> None:

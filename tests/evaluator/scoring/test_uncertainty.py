@@ -5,7 +5,8 @@ import pytest
 from scipy import stats
 
 from evaluator import SCORE_NAMES, confidence_intervals, evaluate
-from evaluator.scoring import intervals, uncertainty
+from evaluator.scoring import uncertainty
+from evaluator.scoring.intervals import recording_sums
 from evaluator.scoring.uncertainty import Bootstrap
 from tests.evaluator.recordings import N_BAGS, Floats, predictions, some_sums, world
 
@@ -44,21 +45,21 @@ def test_sums_per_recording_are_those_of_a_loop_and_add_up_to_the_report() -> No
 def test_intervals_are_those_of_a_plain_loop_over_the_same_weights() -> None:
     truth = world(3)
     mine = predictions(truth, 4)
-    bags = intervals.recording_sums(mine, truth)
+    bags = recording_sums(mine, truth)
     weights = uncertainty.generator_of(truth.digest, purpose="weights").standard_exponential(
         (10_000, N_BAGS), dtype=np.float32
     )
-    found = confidence_intervals(mine, truth)
+    intervals = confidence_intervals(mine, truth)
     for column, name in enumerate(SCORE_NAMES):
         counts = bags.counts[:, column]
         degrees = (counts**2).sum() ** 2 / (counts**4).sum() if counts.any() else 0
         if degrees < 8:
-            assert found[name] is None
+            assert intervals[name] is None
             continue
         means = [float(row @ bags.sums[:, column] / (row @ counts)) for row in weights]
         effective = counts.sum() ** 2 / (counts**2).sum()
         tail = stats.norm.cdf(-stats.t.ppf(0.975, degrees) * (effective / (effective - 1)) ** 0.5)
-        assert found[name] == pytest.approx(np.quantile(means, [tail, 1 - tail]), rel=2e-4)
+        assert intervals[name] == pytest.approx(np.quantile(means, [tail, 1 - tail]), rel=2e-4)
 
 
 def test_intervals_agree_with_another_bootstrap_and_with_the_normal_distribution() -> None:

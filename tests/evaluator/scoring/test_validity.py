@@ -1,6 +1,6 @@
-"""Whether confidence intervals, tests and rank ranges hold; `python -m tests.validity` says how well.
+"""Confidence intervals, tests and rank ranges hold; `python -m tests.validity` prints how well.
 
-Here few repetitions, with room for their own chance; the command makes thousands.
+The repetitions are few, and the limits leave room for their chance; the command makes thousands.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 SKEWED = {"Pareto", "unequal"}
 
 
-def _found(model: Model, n_recordings: int) -> Coverage:
+def _simulated(model: Model, n_recordings: int) -> Coverage:
     rng = np.random.default_rng([n_recordings, *model.name.encode()])
     return coverage.coverage(model, n_recordings=n_recordings, n=200, n_resamples=1_000, n_flips=999, rng=rng)
 
@@ -29,13 +29,13 @@ def _found(model: Model, n_recordings: int) -> Coverage:
 def test_intervals_hold_the_truth_and_agree_with_p(model: Model, n_recordings: int) -> None:
     if model not in error_models.available():
         pytest.skip("KITTI: no shared/data/kitti-dev beside this checkout")
-    found = _found(model, n_recordings)
-    assert found.n_contradictions == 0
+    simulated = _simulated(model, n_recordings)
+    assert simulated.n_contradictions == 0
     worse = 0.81 if model.name == "informative" else 0.86 if model.name in SKEWED else 0.89
-    assert min(found.all.of_means) >= worse
+    assert min(simulated.all.of_means) >= worse
     if model.name != "informative":
-        assert found.all.of_difference >= 0.91
-        assert 0.02 <= found.all.below_5_percent <= 0.09
+        assert simulated.all.of_difference >= 0.91
+        assert 0.02 <= simulated.all.below_5_percent <= 0.09
 
 
 @pytest.mark.parametrize(
@@ -43,18 +43,18 @@ def test_intervals_hold_the_truth_and_agree_with_p(model: Model, n_recordings: i
 )
 def test_asymmetric_differences_are_called_significant_too_often(model: Model) -> None:
     """The limit that docs/uncertainty.md states: equal means by different routes break the symmetry."""
-    few, many = _found(model, 50), _found(model, 700)
+    few, many = _simulated(model, 50), _simulated(model, 700)
     assert few.all.below_5_percent > 0.08
     assert many.all.below_5_percent < few.all.below_5_percent
 
 
 @pytest.mark.parametrize("model", [error_models.ONE_FAILS], ids=str)
 def test_the_interval_of_the_method_that_fails_is_the_worse_one(model: Model) -> None:
-    """Whoever looks at the other method alone sees nothing of it."""
-    found = _found(model, 50)
-    assert found.all.of_means[1] < 0.92 < found.all.of_means[0]
-    assert 0.3 < found.share_shown < 0.6
-    assert found.shown.n == round(200 * found.share_shown)
+    """The interval of the other method alone does not show it."""
+    simulated = _simulated(model, 50)
+    assert simulated.all.of_means[1] < 0.92 < simulated.all.of_means[0]
+    assert 0.3 < simulated.share_shown < 0.6
+    assert simulated.shown.n == round(200 * simulated.share_shown)
 
 
 def test_a_test_of_single_sequences_is_wrong_most_of_the_time() -> None:
@@ -97,12 +97,12 @@ def test_recordings_of_alike_days_need_days_as_units() -> None:
     """35 recordings a day whose levels correlate by 0.2: by recordings, intervals are too narrow."""
     model = worlds.day_model(35, 0.2)
 
-    def found(units: Callable[[Drawn], Drawn]) -> Coverage:
+    def coverage_by(units: Callable[[Drawn], Drawn]) -> Coverage:
         rng = np.random.default_rng(5)
         return coverage.coverage(
             model, n_recordings=700, n=100, n_resamples=500, n_flips=499, rng=rng, units=units
         )
 
-    recordings, days = found(coverage.as_drawn), found(coverage.days_of(35))
+    recordings, days = coverage_by(coverage.as_drawn), coverage_by(coverage.days_of(35))
     assert recordings.all.of_difference < 0.8 < days.all.of_difference
     assert min(recordings.all.of_means) < 0.8 < min(days.all.of_means)

@@ -24,7 +24,7 @@ def table(name: str) -> PublishedTable:
     return published_tables().table(name)
 
 
-def test_numbers_are_those_that_were_held_against_a_second_copy_typed_from_the_paper() -> None:
+def test_numbers_are_those_that_were_compared_with_a_second_copy_typed_from_the_paper() -> None:
     values = [[list(row.values) for row in each.rows] for each in published_tables().tables]
     digest = hashlib.sha256(json.dumps(values).encode()).hexdigest()
     assert digest == "04c9f543ff5cb61686fe04ee9d821e6263fd48ed0ee8b7263fa5f5200132d7a4"
@@ -41,14 +41,14 @@ def test_values_are_those_of_the_shared_copy() -> None:
 
 
 def test_contradictions_of_the_paper_are_noted_where_they_are() -> None:
-    said = {
+    quotes = {
         "main-results": ("15.5", "13.7", "54. 0", "16.7", "40.3"),
         "ablation-nerf-sequences": ("1 K", "16.4"),
         "dataset-comparison": ("1 M",),
         "ablation-kernel-size": ("kernel of 9",),
         "ablation-plate-blur": ("40.5",),
     }
-    for name, words in said.items():
+    for name, words in quotes.items():
         assert all(any(word in note for note in table(name).notes) for word in words), name
 
 

@@ -10,12 +10,12 @@ from evaluator.tables.sentences import sentence
 FAR = Difference(-4.1, -5.3, -2.9, 0.0003)
 
 
-def said(found: Difference, *, name: str = "mid", decimals: int = 2) -> str:
-    return sentence("A", "B", name=name, found=found, decimals=decimals)
+def sentence_of(difference: Difference, *, name: str = "mid", decimals: int = 2) -> str:
+    return sentence("A", "B", name=name, found=difference, decimals=decimals)
 
 
 @pytest.mark.parametrize(
-    ("found", "amount", "ends"),
+    ("difference", "amount", "ends"),
     [
         (FAR, "4.1 lower", "2.9 to 5.3 lower"),
         (Difference(13.27, 2.0, 25.0, 0.0123), "13 higher", "2 to 25 higher"),
@@ -28,15 +28,15 @@ def said(found: Difference, *, name: str = "mid", decimals: int = 2) -> str:
     ],
 )
 def test_a_significant_difference_has_both_ends_of_its_interval(
-    found: Difference, amount: str, ends: str
+    difference: Difference, amount: str, ends: str
 ) -> None:
-    assert said(found) == (
-        f"A's MiD is {amount} than B's (95 % confidence interval: {ends}; p = {found.p:.4f})."
+    assert sentence_of(difference) == (
+        f"A's MiD is {amount} than B's (95 % confidence interval: {ends}; p = {difference.p:.4f})."
     )
 
 
 @pytest.mark.parametrize(
-    ("found", "words"),
+    ("difference", "words"),
     [
         (
             Difference(-0.1, -0.2, 0.0, None, 0.001),
@@ -53,25 +53,25 @@ def test_a_significant_difference_has_both_ends_of_its_interval(
     ],
 )
 def test_an_interval_of_a_hidden_split_that_ends_at_0_says_why_and_p_judges(
-    found: Difference, words: str
+    difference: Difference, words: str
 ) -> None:
-    assert found.is_significant
-    assert said(found, decimals=1) == f"A's MiD is {words}"
+    assert difference.is_significant
+    assert sentence_of(difference, decimals=1) == f"A's MiD is {words}"
 
 
 @pytest.mark.parametrize(
-    ("found", "ends", "detectable"),
+    ("difference", "ends", "detectable"),
     [
         (Difference(-2.0, -2.5, 0.3, 0.0812), "0.3 higher to 2.5 lower", "2.0"),
         (Difference(1.1, -0.3, 2.5, 0.12), "0.3 lower to 2.5 higher", "2.0"),
         (Difference(-1.25, -2.5, 0.0, 0.05), "0.0 to 2.5 lower", "1.8"),
     ],
 )
-def test_an_undecided_difference_says_what_would_have_been_found(
-    found: Difference, ends: str, detectable: str
+def test_an_undecided_difference_says_what_the_test_detects(
+    difference: Difference, ends: str, detectable: str
 ) -> None:
-    text = said(found)
-    assert f"(95 % confidence interval: {ends}; p = {found.p:.4f})." in text
+    text = sentence_of(difference)
+    assert f"(95 % confidence interval: {ends}; p = {difference.p:.4f})." in text
     assert "The difference is not significant." in text
     assert text.endswith(f" The test detects a difference above {detectable} with about 80 % power.")
 
@@ -79,20 +79,20 @@ def test_an_undecided_difference_says_what_would_have_been_found(
 def test_the_detectable_difference_is_that_of_80_percent_power() -> None:
     stats = pytest.importorskip("scipy.stats")
     ratio = (stats.norm.ppf(0.975) + stats.norm.ppf(0.8)) / stats.norm.ppf(0.975)
-    found = Difference(-0.1, -1.1, 0.9, 0.8).detectable_difference
-    assert found == pytest.approx(ratio, rel=1e-6)
+    detectable = Difference(-0.1, -1.1, 0.9, 0.8).detectable_difference
+    assert detectable == pytest.approx(ratio, rel=1e-6)
     assert FAR.detectable_difference is None
     assert Difference(-0.1, None, None, None).detectable_difference is None
 
 
 def test_errors_in_percent_differ_by_percentage_points() -> None:
-    text = said(Difference(0.7, -0.2, 1.6, 0.12), name="rte_small")
+    text = sentence_of(Difference(0.7, -0.2, 1.6, 0.12), name="rte_small")
     assert text.startswith("A's RTE on small is 0.70 percentage points higher than B's (95 %")
     assert "detects a difference above 1.29 percentage points with" in text
 
 
 @pytest.mark.parametrize(
-    ("difference", "decimals", "words"),
+    ("amount", "decimals", "words"),
     [
         (0.0, 2, "two decimals"),
         (-0.0012, 2, "two decimals"),
@@ -100,15 +100,13 @@ def test_errors_in_percent_differ_by_percentage_points() -> None:
         (0.04, 1, "one decimal"),
     ],
 )
-def test_no_difference_is_called_lower_or_higher_by_zero(
-    difference: float, decimals: int, words: str
-) -> None:
-    found = Difference(difference, difference - 0.001, difference + 0.001, 0.0003)
-    assert said(found, decimals=decimals) == f"A and B have the same MiD to {words}."
+def test_no_difference_is_called_lower_or_higher_by_zero(amount: float, decimals: int, words: str) -> None:
+    difference = Difference(amount, amount - 0.001, amount + 0.001, 0.0003)
+    assert sentence_of(difference, decimals=decimals) == f"A and B have the same MiD to {words}."
 
 
 def test_digits_are_no_more_than_are_published() -> None:
-    text = said(Difference(-0.4, -0.7, -0.1, 0.02), decimals=1)
+    text = sentence_of(Difference(-0.4, -0.7, -0.1, 0.02), decimals=1)
     assert re.findall(r"\d+\.\d+", text)[:3] == ["0.4", "0.1", "0.7"]
 
 
@@ -121,14 +119,14 @@ def test_digits_are_no_more_than_are_published() -> None:
         (1.0, "p ≥ 0.05", False),
     ],
 )
-def test_where_p_itself_is_not_told_its_class_is(p_below: float, words: str, is_significant: bool) -> None:
-    text = said(Difference(-2.0, -3.0, -1.0, None, p_below))
+def test_where_p_is_hidden_its_class_is_shown(p_below: float, words: str, is_significant: bool) -> None:
+    text = sentence_of(Difference(-2.0, -3.0, -1.0, None, p_below))
     assert f"(95 % confidence interval: 1.0 to 3.0 lower; {words})." in text
     assert ("The difference is not significant." in text) is not is_significant
 
 
 def test_with_too_few_recordings_a_difference_means_nothing() -> None:
-    text = said(Difference(-0.4, None, None, None))
+    text = sentence_of(Difference(-0.4, None, None, None))
     assert text == (
         "A's MiD is 0.40 lower than B's; there are too few recordings to say whether that is significant."
     )

@@ -42,7 +42,7 @@ def whole(body: bytes) -> bytes:
 
 
 def called(function: bytes, n_times: int, *, after: bytes = b"") -> bytes:
-    """Call a function so often with the value that is remembered as number 0."""
+    """Call a function `n_times` with the value that is remembered as number 0."""
     return remembered(function).replace(b"q\x00", b"q\x01") + (b"h\x01h\x00\x85R" + after) * n_times
 
 

@@ -27,7 +27,7 @@ def problem_of(folder: Path) -> tuple[str, str, str]:
 
 
 def cpu_s() -> float:
-    """What the children that have ended have computed."""
+    """Processor time of the children that have ended, in seconds."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
@@ -82,7 +82,7 @@ def three(tmp_path: Path) -> Path:
 
 
 def at_the_second_file(monkeypatch: pytest.MonkeyPatch, action: Callable[[int], object]) -> None:
-    """Do the action to the child when it has read one file and is to get the next."""
+    """Do the action to the child between its first file and its second."""
     real = annotation_folders._contents
 
     def contents(folder: Path, files: Sequence[Path]) -> Contents:
@@ -122,12 +122,12 @@ def test_file_that_needs_too_much_memory_is_named(tmp_path: Path, monkeypatch: p
 @needs_root
 def test_child_has_no_secrets_and_may_open_nothing(three: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TSTTC_TOKEN", "tsttc_secret")
-    found: list[tuple[str, list[str]]] = []
+    observed: list[tuple[str, list[str]]] = []
     at_the_second_file(
-        monkeypatch, lambda pid: found.append((kernel_says(pid, "environ"), limits(pid)["Max open files"]))
+        monkeypatch, lambda pid: observed.append((kernel_says(pid, "environ"), limits(pid)["Max open files"]))
     )
     assert read_manifest(three).n_sequences == 3
-    [(environment, open_files)] = found
+    [(environment, open_files)] = observed
     assert "OPENBLAS_NUM_THREADS" in environment
     assert "secret" not in environment
     assert open_files == ["0", "0"]

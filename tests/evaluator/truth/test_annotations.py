@@ -55,7 +55,7 @@ def test_sequences_are_cut_without_overlap(tmp_path: Path) -> None:
     assert last_frames(tmp_path) == [("7", 5), ("7", 11)]
 
 
-def test_a_skipped_frame_starts_the_sequence_anew(tmp_path: Path) -> None:
+def test_a_skipped_frame_starts_the_sequence_again(tmp_path: Path) -> None:
     write_folder(tmp_path, {"a.pkl": [camera({7: [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11], 8: list(range(12))})]})
     assert last_frames(tmp_path) == [("8", 5), ("7", 11), ("8", 11)]
 
@@ -131,7 +131,7 @@ def without(name: str) -> list[dict[int, list[Any]]]:
 
 
 @pytest.mark.parametrize(
-    ("content", "found"),
+    ("content", "structure"),
     [
         ({}, "a dict"),
         ([[]], "a list in place of a camera"),
@@ -149,12 +149,12 @@ def without(name: str) -> list[dict[int, list[Any]]]:
         ),
     ],
 )
-def test_files_of_another_structure_are_refused(tmp_path: Path, content: object, found: str) -> None:
+def test_files_of_another_structure_are_refused(tmp_path: Path, content: object, structure: str) -> None:
     write_folder(tmp_path, {"sub/a.pkl": content})
     problem = rejection(tmp_path).problems[0]
     assert (problem.code, problem.where) == ("bad-annotations", "sub/a.pkl")
     assert problem.message == (
-        f"The file holds {found}; expected a list of dictionaries, one per camera, "
+        f"The file holds {structure}; expected a list of dictionaries, one per camera, "
         "from timestamp to list of attribute-dicts."
     )
 

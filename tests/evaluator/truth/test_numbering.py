@@ -1,4 +1,4 @@
-"""The toolkit numbers a folder as the file system lists it: said, warned of, and mended by natural keys."""
+"""The toolkit numbers a folder as the file system lists it: we warn of that, and natural keys repair it."""
 
 import json
 import shlex
@@ -24,7 +24,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def results(folder: Path, tmp_path: Path) -> Path:
-    """What the toolkit writes there."""
+    """The toolkit's result file of this folder."""
     path = tmp_path / "results.json"
     path.write_bytes(flat({anno_id: ttc_s for anno_id, (_, ttc_s) in toolkit_results(folder).items()}))
     return path
@@ -55,9 +55,9 @@ def test_results_of_the_toolkit_score_what_they_are_worth_once_they_have_natural
     converted = tmp_path / "natural.json"
     made = tsttc("convert", results, "--annotations", folder, "-o", converted)
     assert (made.exit_code, made.stdout) == (0, f"{converted}: seconds by natural key.\n")
-    found = json.loads(tsttc("score", converted, "--truth", folder, "--json").stdout)
-    assert found["scores"]["overall"]["rte"] == pytest.approx(2.0)
-    assert found["warnings"] == []
+    document = json.loads(tsttc("score", converted, "--truth", folder, "--json").stdout)
+    assert document["scores"]["overall"]["rte"] == pytest.approx(2.0)
+    assert document["warnings"] == []
     assert worth.scores["overall"].rte is not None
     assert worth.scores["overall"].rte > 20
 

@@ -1,4 +1,4 @@
-"""What annotations and tables say of the object beside its time: kept where it is stated, never needed."""
+"""What annotations and tables say of the object apart from its time: kept if stated, never required."""
 
 from pathlib import Path
 
@@ -23,11 +23,11 @@ def test_annotations_keep_occlusion_lane_and_box_and_the_table_of_them_too(tmp_p
     write_folder(tmp_path / "folder", {"a.pkl": [camera({7: SIX}, occ_ratio=0.25, same_lane=np.False_)]})
     truth = read_truth(tmp_path / "folder")
     (tmp_path / "truth.csv").write_bytes(truth.to_csv())
-    for found in (truth, read_truth(tmp_path / "truth.csv")):
-        assert found.objects.occ_ratio.tolist() == [0.25]
-        assert found.objects.same_lane.tolist() == [0.0]
-        assert found.objects.box_height.tolist() == [0.25]
-        assert found.digest == truth.digest
+    for each in (truth, read_truth(tmp_path / "truth.csv")):
+        assert each.objects.occ_ratio.tolist() == [0.25]
+        assert each.objects.same_lane.tolist() == [0.0]
+        assert each.objects.box_height.tolist() == [0.25]
+        assert each.digest == truth.digest
 
 
 @pytest.mark.parametrize("strange", ["much", 2.0, True, None, [0.1]])

@@ -40,7 +40,7 @@ def load(data: bytes) -> object:
 
 @pytest.fixture(autouse=True, scope="module")
 def _memory() -> Iterator[None]:
-    """A few bytes may ask for all memory, and find is what hypothesis does."""
+    """Limit the memory: a few bytes may ask for all of it, and hypothesis finds them."""
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + (512 << 20), hard))
@@ -49,7 +49,7 @@ def _memory() -> Iterator[None]:
 
 
 def codes(data: bytes) -> set[str]:
-    """What is wrong with an annotation file of this content."""
+    """The codes of the problems of an annotation file of this content."""
     with pytest.raises(Rejected) as rejected:
         read_files([("a.pkl", data)], with_ttc=True)
     assert {problem.where for problem in rejected.value.problems} == {"a.pkl"}
@@ -79,9 +79,9 @@ def test_plain_data_reads_back_as_it_was(protocol: int) -> None:
     ],
 )  # fmt: skip
 def test_what_stands_beside_an_array_of_numbers_reads_back(array: np.ndarray, protocol: int) -> None:
-    found = load(pickle.dumps({"box2d": array, "id": 7}, protocol=protocol))
-    assert isinstance(found, dict)
-    assert found["id"] == 7
+    loaded = load(pickle.dumps({"box2d": array, "id": 7}, protocol=protocol))
+    assert isinstance(loaded, dict)
+    assert loaded["id"] == 7
 
 
 @pytest.mark.parametrize("protocol", range(6))
@@ -90,9 +90,9 @@ def test_what_stands_beside_an_array_of_numbers_reads_back(array: np.ndarray, pr
     [np.float64(5.25), np.float32(0.5), np.int64(7), np.bool_(True), np.uint8(200), np.array([7], ">i4")[0]],
 )
 def test_scalars_of_numpy_become_python_numbers(scalar: np.generic, protocol: int) -> None:
-    found = load(pickle.dumps(scalar, protocol=protocol))
-    assert found == scalar.item()
-    assert type(found) is type(scalar.item())
+    loaded = load(pickle.dumps(scalar, protocol=protocol))
+    assert loaded == scalar.item()
+    assert type(loaded) is type(scalar.item())
 
 
 @pytest.mark.parametrize("protocol", range(6))
@@ -202,14 +202,14 @@ def test_state_of_an_attribute_dict_is_only_data() -> None:
     data = proto4(
         name("foo", "EasyDict") + b")\x81}(" + text("__class__") + text("x") + text("update") + b"Nub"
     )
-    found = load(data)
-    assert type(found) is Attributes
-    assert found == {"__class__": "x", "update": None}
-    assert callable(found.update)
+    loaded = load(data)
+    assert type(loaded) is Attributes
+    assert loaded == {"__class__": "x", "update": None}
+    assert callable(loaded.update)
 
 
 def faults(data: bytes) -> set[str]:
-    """What is wrong with a pickle, or nothing."""
+    """The problem of a pickle, or nothing."""
     try:
         load(data)
     except Rejected as rejected:

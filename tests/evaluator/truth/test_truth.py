@@ -54,7 +54,7 @@ def test_a_table_is_read_in_file_order(write: Write) -> None:
     assert (truth.n_sequences, manifest.n_sequences, manifest.n_recordings) == (3, 3, 2)
 
 
-def test_columns_are_found_by_name_and_others_ignored(write: Write) -> None:
+def test_columns_are_matched_by_name_and_others_ignored(write: Write) -> None:
     path = write('2.5,x,0007,4,"1",1500000000,3', header="ttc,note,bag_stamp,anno_id,cam_id,ts,track_id")
     truth = read_truth(path)
     assert truth.ttc_s.tolist() == [2.5]
@@ -255,10 +255,10 @@ def test_what_is_saved_reads_back_exactly(tmp_path: Path, write: Write) -> None:
     truth = read_truth(write(*ROWS))
     path = tmp_path / "kept"
     truth.save(path)
-    found = GroundTruth.load(path)
-    assert found.digest == truth.digest
-    assert found.manifest.digest == truth.manifest.digest
-    assert found.to_csv() == truth.to_csv()
+    loaded = GroundTruth.load(path)
+    assert loaded.digest == truth.digest
+    assert loaded.manifest.digest == truth.manifest.digest
+    assert loaded.to_csv() == truth.to_csv()
     truth.manifest.save(path)
     assert Manifest.load(path).to_csv() == truth.manifest.to_csv()
 

@@ -35,16 +35,16 @@ def test_comparison_is_a_202_until_a_worker_has_computed_it(entries: list[Submis
     ]
     for pair in body["pairs"]:
         assert list(pair["differences"]) == list(SCORE_NAMES)
-        found = pair["differences"]["mid"]
-        assert found["low"] <= found["difference"] <= found["high"]
+        mid = pair["differences"]["mid"]
+        assert mid["low"] <= mid["difference"] <= mid["high"]
         assert "MiD is" in pair["sentence"]
-        is_undecided = found["detectable_difference"] is not None
-        assert is_undecided == ("with about 80 % power" in pair["sentence"]) == (not found["is_significant"])
+        is_undecided = mid["detectable_difference"] is not None
+        assert is_undecided == ("with about 80 % power" in pair["sentence"]) == (not mid["is_significant"])
         names = {entry["method_id"]: entry["method"] for entry in body["entries"]}
-        for name, found in pair["differences"].items():
-            if found is not None:
-                assert found["sentence"].startswith(names[pair["first"]]), name
-                assert (" on small" in found["sentence"]) == name.endswith("_small"), name
+        for name, difference in pair["differences"].items():
+            if difference is not None:
+                assert difference["sentence"].startswith(names[pair["first"]]), name
+                assert (" on small" in difference["sentence"]) == name.endswith("_small"), name
         assert pair["differences"]["mid"]["sentence"] == pair["sentence"]
     assert client.get(address(*ids, more="&edition=1")).json() == body
 

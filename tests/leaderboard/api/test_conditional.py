@@ -1,4 +1,4 @@
-"""Every answer of the API has an ETag, and who has it already is told so and nothing else."""
+"""Every answer of the API has an ETag; a client that sends a current one gets a 304 without a body."""
 
 from typing import Any
 
@@ -44,22 +44,22 @@ def addresses(shown: Submission) -> list[str]:
         "name": "main-results",
     }
     described = schema()["paths"]
-    found = [path.format(**values) for path, operations in described.items() if "get" in operations]
+    paths = [path.format(**values) for path, operations in described.items() if "get" in operations]
     other = Submission.objects.exclude(pk=shown.pk).get()
     pair = f"split=test&m={shown.method_id}&m={other.method_id}"
     return [
-        *(f"{path}?{pair}" if path.endswith("/compare") else path for path in found),
+        *(f"{path}?{pair}" if path.endswith("/compare") else path for path in paths),
         "/api/v1/splits/test/board?at=2030-01-01",
         f"/api/v1/splits/test/board?at={shown.submitted_at:%Y-%m-%d}",
     ]
 
 
-@pytest.mark.parametrize(("is_somebody", "n_least"), [(False, 10), (True, 15)])
+@pytest.mark.parametrize(("is_signed_in", "n_least"), [(False, 10), (True, 15)])
 def test_whatever_is_answered_has_a_tag_that_is_a_304_when_it_is_asked_with(
-    shown: Submission, owner: User, is_somebody: bool, n_least: int
+    shown: Submission, owner: User, is_signed_in: bool, n_least: int
 ) -> None:
     client = Client()
-    if is_somebody:
+    if is_signed_in:
         client.force_login(owner)
     n_answered = 0
     for address in addresses(shown):
@@ -74,7 +74,7 @@ def test_whatever_is_answered_has_a_tag_that_is_a_304_when_it_is_asked_with(
             again = asked(client, address, known=known)
             assert (again.status_code, again.getvalue(), again["ETag"]) == (304, b"", tag), address
         for response in (first, again):
-            expected = "private, no-store" if is_somebody else "public, no-cache"
+            expected = "private, no-store" if is_signed_in else "public, no-cache"
             assert response["Cache-Control"] == expected, address
             assert {"Cookie", "Authorization"} <= set(response["Vary"].split(", ")), address
         assert asked(client, address, known='"other"').status_code == 200, address

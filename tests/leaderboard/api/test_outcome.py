@@ -1,4 +1,4 @@
-"""What the API says of a scored submission beyond its scores: intervals, and its rank on the board."""
+"""The API's answer about a scored submission beyond its scores: intervals, and its rank on the board."""
 
 from pathlib import Path
 from typing import Any
@@ -27,8 +27,8 @@ def client(owner: User) -> APIClient:
 
 
 def look(client: APIClient, submission: Submission, **query: str) -> dict[str, Any]:
-    found: dict[str, Any] = client.get(f"{LIST}/{submission.pk}", query).json()
-    return found
+    body: dict[str, Any] = client.get(f"{LIST}/{submission.pk}", query).json()
+    return body
 
 
 def test_intervals_and_rank_are_those_of_the_board(client: APIClient, entries: list[Submission]) -> None:
@@ -52,7 +52,7 @@ def test_until_they_are_computed_intervals_are_awaited(client: APIClient, entrie
     assert after["intervals"]
 
 
-def test_nobody_is_told_to_wait_for_ever(client: APIClient, entries: list[Submission]) -> None:
+def test_nobody_waits_for_ever(client: APIClient, entries: list[Submission]) -> None:
     Evaluation.objects.update(finished_at=F("finished_at") - outcomes.AWAITED_FOR)
     assert look(client, entries[0])["awaits_intervals"] is False
 
@@ -92,7 +92,7 @@ def test_withdrawn_one_has_no_rank(client: APIClient, entries: list[Submission],
     intake.withdraw(submission=entries[0], actor=owner, now=timezone.now())
     body = look(client, entries[0])
     assert body["rank"] is None
-    assert {found["rank_low"] for found in body["intervals"].values()} == {None}
+    assert {interval["rank_low"] for interval in body["intervals"].values()} == {None}
 
 
 def test_result_of_a_former_edition_has_no_rank(
@@ -104,7 +104,7 @@ def test_result_of_a_former_edition_has_no_rank(
     publish(second, leave_out=True)
     body = look(client, entries[0])
     assert (body["edition"], body["rank"]) == (1, None)
-    assert {found["rank_low"] for found in body["intervals"].values()} == {None}
+    assert {interval["rank_low"] for interval in body["intervals"].values()} == {None}
 
 
 def test_list_tells_of_each_what_its_own_address_tells(

@@ -1,4 +1,4 @@
-"""What only a team itself gets: whose token it is, and the bytes of a file."""
+"""Answers for a team itself only: whose token it is, and the bytes of a file."""
 
 import pytest
 from rest_framework.test import APIClient
@@ -43,14 +43,14 @@ def test_the_file_of_another_team_does_not_exist_though_the_method_is_public(
 ) -> None:
     for other in (stranger, maintainer):
         client = client_of(other)
-        found, absent = client.get(address(submission)), client.get(ABSENT)
-        assert (found.status_code, found.json()) == (404, absent.json())
+        response, absent = client.get(address(submission)), client.get(ABSENT)
+        assert (response.status_code, response.json()) == (404, absent.json())
     assert client_of(None).get(address(submission)).status_code == 401
 
 
 def test_a_token_gives_the_file_within_its_limits_only(submission: Submission, owner: User) -> None:
-    found = client_of(owner, scopes=(Scope.SUBMIT,)).get(address(submission))
-    assert (found.status_code, found.json()["code"]) == (403, "token-scope")
+    response = client_of(owner, scopes=(Scope.SUBMIT,)).get(address(submission))
+    assert (response.status_code, response.json()["code"]) == (403, "token-scope")
     assert client_of(owner, split_name="val").get(address(submission)).status_code == 404
     assert client_of(owner, split_name="test").get(address(submission)).getvalue() != b""
 
@@ -65,14 +65,14 @@ def test_every_token_may_ask_whose_it_is_and_no_person_is_named(
     submission: Submission, owner: User, scope: Scope
 ) -> None:
     client = client_of(owner, scopes=(scope,), split_name="test")
-    found = client.get("/api/v1/account").json()
-    assert found["expires_at"].endswith("Z")
-    assert {**found, "expires_at": None} == {
+    account = client.get("/api/v1/account").json()
+    assert account["expires_at"].endswith("Z")
+    assert {**account, "expires_at": None} == {
         "team": "Owls",
         "token": "CI",
         "scopes": [scope.value],
         "split": "test",
         "expires_at": None,
     }
-    assert owner.email not in str(found)
+    assert owner.email not in str(account)
     assert client_of(None).get("/api/v1/account").status_code == 401

@@ -99,7 +99,7 @@ def test_our_own_faults(edition: Edition, owner: User, monkeypatch: pytest.Monke
     assert "ZeroDivision" not in str(body)
 
 
-def test_what_is_malformed_before_any_view_is_told_alike(db: None, settings: Settings) -> None:
+def test_malformed_requests_are_answered_alike_before_any_view(db: None, settings: Settings) -> None:
     settings.ALLOWED_HOSTS, settings.SITE_URL = ["board.example.org"], "https://board.example.org"
     checked(Client().get("/api/v1/splits"), 400, "bad-request")
     for referer in ("", "https://board.example.org/board/test/", "http://testserver/board/test/"):
@@ -139,7 +139,7 @@ def test_bad_pages_are_a_400(edition: Edition, owner: User, query: str, code: st
     checked(client_of(owner).get(f"/api/v1/submissions?{query}"), 400, code)
 
 
-def test_others_rows_are_no_places_to_go_on_from(edition: Edition, owner: User, stranger: User) -> None:
+def test_a_row_of_another_team_is_no_cursor(edition: Edition, owner: User, stranger: User) -> None:
     row = builders.submit(owner, builders.predictions(edition))
     checked(client_of(stranger).get(f"/api/v1/submissions?after={row.pk}"), 400, "bad-cursor")
 

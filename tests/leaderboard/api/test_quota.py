@@ -1,4 +1,4 @@
-"""What the API says about quotas."""
+"""The API's answers about quotas."""
 
 from datetime import datetime, timedelta
 

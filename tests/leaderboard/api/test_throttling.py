@@ -1,4 +1,4 @@
-"""How often one may ask, and that nobody chooses who they are counted as."""
+"""Rates of requests per account or address, which no header of the client changes."""
 
 from typing import Any
 
@@ -46,13 +46,13 @@ def test_one_too_many_is_a_429_that_says_when_to_come_back(edition: Edition) -> 
     assert body["detail"].startswith("Too many requests in a short time; the next one is answered in ")
 
 
-def test_a_forwarding_header_makes_nobody_somebody_else(edition: Edition) -> None:
+def test_a_forwarding_header_does_not_change_who_is_counted(edition: Edition) -> None:
     client = APIClient()
-    found = [
+    statuses = [
         client.get(BOARD, HTTP_X_FORWARDED_FOR=f"10.0.0.{n}", HTTP_FORWARDED=f"for=10.0.0.{n}").status_code
         for n in range(5)
     ]
-    assert found == [200, 200, 200, 429, 429]
+    assert statuses == [200, 200, 200, 429, 429]
 
 
 def test_behind_a_proxy_what_it_wrote_counts_and_nothing_before_it(
@@ -66,16 +66,16 @@ def test_behind_a_proxy_what_it_wrote_counts_and_nothing_before_it(
 
 
 def test_addresses_of_one_ipv6_network_count_as_one(edition: Edition) -> None:
-    found = [APIClient(REMOTE_ADDR=f"2001:db8::{n:x}").get(BOARD).status_code for n in range(1, 5)]
-    assert found == [200, 200, 200, 429]
+    statuses = [APIClient(REMOTE_ADDR=f"2001:db8::{n:x}").get(BOARD).status_code for n in range(1, 5)]
+    assert statuses == [200, 200, 200, 429]
     assert APIClient(REMOTE_ADDR="2001:db8:0:1::1").get(BOARD).status_code == 200
 
 
 def test_an_account_is_counted_whatever_its_token_and_address(
     edition: Edition, owner: User, stranger: User
 ) -> None:
-    found = [client_of(owner).get(BOARD, REMOTE_ADDR=f"192.0.2.{n}").status_code for n in range(4)]
-    assert found == [200, 200, 200, 429]
+    statuses = [client_of(owner).get(BOARD, REMOTE_ADDR=f"192.0.2.{n}").status_code for n in range(4)]
+    assert statuses == [200, 200, 200, 429]
     assert client_of(stranger).get(BOARD).status_code == 200
     assert APIClient().get(BOARD).status_code == 200
 
@@ -101,13 +101,13 @@ def test_boards_as_of_a_time_have_a_rate_of_their_own(
 
 
 def test_reports_of_leaked_tokens_are_throttled(db: None) -> None:
-    found = [
+    statuses = [
         APIClient()
         .post(REVOKE, {"token": "x"}, format="json", HTTP_X_FORWARDED_FOR=f"10.0.0.{n}")
         .status_code
         for n in range(4)
     ]
-    assert found == [200, 200, 200, 429]
+    assert statuses == [200, 200, 200, 429]
 
 
 @pytest.mark.parametrize("address", ["", "unix:"])

@@ -17,7 +17,7 @@ def waiting_one(edition: Edition, owner: User) -> Submission:
     return builders.submit(owner, builders.predictions(edition))
 
 
-def test_who_asks_is_told_to_come_back_in_a_second_until_it_is_final(
+def test_the_answer_asks_to_come_back_in_a_second_until_it_is_final(
     waiting_one: Submission, owner: User
 ) -> None:
     client = client_of(owner)

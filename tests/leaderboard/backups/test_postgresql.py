@@ -128,11 +128,11 @@ def path_of(folder: Path) -> str:
     return f"{folder}:{os.environ['PATH']}"
 
 
-@pytest.mark.parametrize("place", [empty_database, migrated_database])
+@pytest.mark.parametrize("new_database", [empty_database, migrated_database])
 def test_what_was_restored_into_a_fresh_database_is_what_was_saved_and_goes_on(
-    source: Source, place: Callable[[], AbstractContextManager[str]], tmp_path: Path
+    source: Source, new_database: Callable[[], AbstractContextManager[str]], tmp_path: Path
 ) -> None:
-    with place() as new:
+    with new_database() as new:
         done = run("manage.py", "restore", str(source.backup), url=new, data=tmp_path)
         assert "1 board is the same byte for byte" in done.stdout, done.stderr
         assert content(new) == content(source.url)

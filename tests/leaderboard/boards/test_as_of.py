@@ -141,17 +141,17 @@ class History:
             roll_back(replaces=split.published_edition.number)
 
     def _some(self, rows: Any, *, by: str = "name") -> list[Any]:
-        """One of these rows, chosen alike in every run: ids are made by chance."""
-        found = list(rows.order_by(by))
-        return [self._rng.choice(found)] if found else []
+        """Choose one of these rows, the same in every run although ids are random."""
+        choices = list(rows.order_by(by))
+        return [self._rng.choice(choices)] if choices else []
 
     @staticmethod
     def _of(team: Team) -> User:
         return User.objects.get(membership__team=team)
 
 
-def told(entry: dict[str, Any], *, renames: bool) -> dict[str, Any]:
-    """What a board of the past has to tell of a row for ever.
+def lasting(entry: dict[str, Any], *, renames: bool) -> dict[str, Any]:
+    """Select the fields of a row that a board of the past never changes.
 
     A name and the moments of a day come to light when a method is shown under its name, on all of its boards.
     """
@@ -171,9 +171,9 @@ def test_it_is_what_was_shown_on_that_day(
     assert len({csv for _, _, csv in history.shown}) > N_EVENTS / 3
     for day, then, csv in history.shown:
         for at in (f"{day:%Y-%m-%d}", day.isoformat()):
-            found = client.get(API, {"at": at}).json()
-            assert found["edition"] == then["edition"], at
-            rows = [[told(entry, renames=renames) for entry in board["entries"]] for board in (found, then)]
+            past = client.get(API, {"at": at}).json()
+            assert past["edition"] == then["edition"], at
+            rows = [[lasting(entry, renames=renames) for entry in board["entries"]] for board in (past, then)]
             assert rows[0] == rows[1], at
             if not renames:
                 assert client.get(CSV, {"at": at}).content == csv, at

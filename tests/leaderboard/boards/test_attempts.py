@@ -1,4 +1,4 @@
-"""The number of attempts beside a row: what a team spent, as far as it shows what it spent it on."""
+"""The number of attempts next to a row: those of its team that the row may reveal."""
 
 from typing import Any
 

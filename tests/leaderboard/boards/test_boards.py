@@ -1,4 +1,4 @@
-"""`standings.board`: who stands where, and who sees whom."""
+"""`listing.board`: the order of the rows, and who sees which."""
 
 from datetime import UTC, datetime
 
@@ -63,7 +63,7 @@ def test_waiting_and_rejected_submissions_are_not_on_the_board(edition: Edition,
     assert len(board.entries) == 5
 
 
-def test_a_method_is_represented_by_its_best_standing_submission(edition: Edition, owner: User) -> None:
+def test_a_method_is_represented_by_its_best_active_submission(edition: Edition, owner: User) -> None:
     best = builders.submit(owner, builders.predictions(edition, factor=1.05))
     builders.submit(owner, builders.predictions(edition, factor=1.5))
     builders.score_all()
@@ -78,7 +78,7 @@ def test_a_method_is_represented_by_its_best_standing_submission(edition: Editio
     assert shown() != [best.pk]
 
 
-def test_private_method_is_seen_by_its_team_alone_and_takes_nobodys_place(
+def test_private_method_is_seen_by_its_team_alone_and_takes_nobodys_rank(
     edition: Edition, owner: User, teammate: User, stranger: User, maintainer: User
 ) -> None:
     builders.submit(owner, builders.predictions(edition, factor=1.0000001), method="Secret")

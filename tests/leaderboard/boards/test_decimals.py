@@ -76,9 +76,9 @@ def test_every_form_has_the_editions_decimals(
         line = next(line for line in body.splitlines() if "Foo" in line)
         assert texts["mid"] in line
         assert texts["mid_high"] in line
-    found = re.search(r"MiD ([\d.]+)", client.get("/board/test/feed.atom").text)
-    assert found is not None
-    texts["feed"] = found[1]
+    match = re.search(r"MiD ([\d.]+)", client.get("/board/test/feed.atom").text)
+    assert match is not None
+    texts["feed"] = match[1]
     assert {name: len(text.partition(".")[2]) for name, text in texts.items()} == dict.fromkeys(
         texts, decimals
     )

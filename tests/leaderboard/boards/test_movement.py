@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def months(edition: Edition, owner: User) -> list[Method]:
-    """Eight methods, of which all but two are two months old, as is the edition."""
+    """Eight methods: all but two are two months old, as is the edition."""
     methods = board_rows.fill(edition, n=8, user=owner)
     then = timezone.now() - timedelta(days=60)
     old = [method.pk for method in methods[:6]]
@@ -56,9 +56,9 @@ def test_page_tells_what_is_new_and_what_has_moved(months: list[Method], client:
     new = [row for row in root.one("tbody").all("tr") if row.all("span", class_="new")]
     assert {row.one("div", class_="name").text for row in new} == {f"{each.name} new" for each in months[6:]}
     moved = movement.moved(board_of(), now=timezone.now())
-    told = [each.text for each in root.one("tbody").all("span", class_="moved")]
-    assert len(told) == sum(1 for each in moved.values() if each)
-    assert all("in a month" in text for text in told)
+    marks = [each.text for each in root.one("tbody").all("span", class_="moved")]
+    assert len(marks) == sum(1 for each in moved.values() if each)
+    assert all("in a month" in text for text in marks)
     Submission.objects.update(submitted_at=timezone.now())
     Method.objects.update(shown_at=timezone.now())
     builders.board_changed("test")

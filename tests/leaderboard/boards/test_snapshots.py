@@ -1,4 +1,4 @@
-"""What everybody sees is drawn once, is never old, never mixed, and says nothing of what is private."""
+"""Public pages are drawn once, are current and consistent, and reveal nothing private."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -172,8 +172,8 @@ def test_a_public_page_takes_four_statements_whatever_its_size(
     allowed = {address: MAX_QUERIES_AS_OF if "?at=" in address else MAX_QUERIES for address in addresses}
     assert {address: n for address, n in counts.items() if n > allowed[address]} == {}
     # What workers still compute changes by itself, and a board of another time is for its one reader.
-    anew = ("compare", "/charts/", "?at=")
-    kept = [address for address in addresses if not any(part in address for part in anew)]
+    uncached = ("compare", "/charts/", "?at=")
+    kept = [address for address in addresses if not any(part in address for part in uncached)]
     assert len(kept) > 8
     assert {n_queries(client, address) for address in kept} == {1}
 
@@ -200,7 +200,7 @@ def test_who_knows_an_answer_is_not_sent_it_again(
     assert "Renamed" in third.text
 
 
-def test_a_method_is_nowhere_until_it_is_shown_and_told_of_as_it_is_then(
+def test_a_method_is_absent_until_it_is_shown_and_then_appears_as_it_is(
     edition: Edition, owner: User, client: Client
 ) -> None:
     method = Method.objects.create(team=teams.team_of(user=owner), name="Secret")

@@ -41,7 +41,7 @@ ORDER = (
     "leaderboard_edition",
     BOARD,
 )
-"""What a transaction locks, from first to last; `docs/architecture.md` says it as well."""
+"""The locks of a transaction, from first to last; `docs/architecture.md` lists them as well."""
 
 
 @pytest.fixture
@@ -126,7 +126,7 @@ def test_what_once_waited_for_each_other_for_ever_does_not(
     assert outcome.faults == (None, None)
 
 
-def test_whoever_has_recorded_and_not_ended_keeps_nobody_waiting(verbs: dict[str, Action]) -> None:
+def test_an_open_transaction_that_has_recorded_keeps_no_other_waiting(verbs: dict[str, Action]) -> None:
     outcome = meet(
         verbs["make a token"], verbs["submit for the first time"], at=lambda number, sql: EVENT in sql
     )

@@ -1,4 +1,4 @@
-"""What holds when many do the same at once, each on a connection of its own (SQLite has one writer)."""
+"""Invariants under concurrent requests, each on a connection of its own (SQLite has one writer)."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -60,8 +60,8 @@ def test_twenty_writers_and_four_who_seal_beside_them_keep_one_unbroken_chain() 
 
     at_once(24, write)
     audit.seal()
-    found = audit.verify()
-    assert (found.n_events, found.breaks) == (1000, ())
+    verification = audit.verify()
+    assert (verification.n_events, verification.breaks) == (1000, ())
     assert len(set(audit.events().values_list("noun_id", flat=True))) == 1000
 
 
@@ -83,7 +83,7 @@ def test_twenty_submissions_at_once_take_exactly_the_five_slots_there_are(
 
 
 def test_tokens_made_at_once_stay_within_their_number(owner: User) -> None:
-    for number in range(tokens.MAX_STANDING - 5):
+    for number in range(tokens.MAX_ACTIVE - 5):
         tokens.create(user=owner, name=f"Old {number}", now=FIRST_DAY)
 
     def make(number: int) -> bool:

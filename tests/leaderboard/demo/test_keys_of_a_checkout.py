@@ -20,5 +20,5 @@ def test_data_folder_is_closed_to_other_accounts_also_where_it_was_open(tmp_path
     shared.chmod(0o1777)
     for folder in (made, old, shared):
         environment.make_private(folder)
-    found = [stat.S_IMODE(folder.stat().st_mode) for folder in (made, old, shared)]
-    assert found == [0o700, 0o700, 0o1777]
+    modes = [stat.S_IMODE(folder.stat().st_mode) for folder in (made, old, shared)]
+    assert modes == [0o700, 0o700, 0o1777]

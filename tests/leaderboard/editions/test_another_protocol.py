@@ -73,7 +73,7 @@ def far(old_receipt: bytes, owner: User, monkeypatch: pytest.MonkeyPatch) -> Sub
     return submission
 
 
-def said(client: Client, address: str, status: int = 200) -> str:
+def page_text(client: Client, address: str, status: int = 200) -> str:
     response = client.get(address)
     assert response.status_code == status, address
     return pages.page(response).text
@@ -100,22 +100,22 @@ def test_a_further_range_and_a_third_metric_stand_wherever_their_edition_is_show
     assert len(scored) == len(FACTORS) + 1
     assert all(value is not None for row in scored for value in row["scores"].values())
     assert all(row["scores"][name] is None for row in board["entries"] if row not in scored for name in NEW)
-    page = said(client, "/board/test/")
+    page = page_text(client, "/board/test/")
     assert "Absolute TTC error (AE)" in page
     assert "20–60 s" in page
-    assert "AE" in said(client, "/board/test/?sort=-absolute_far&columns=absolute")
-    assert "cannot be sorted by 'absolute'" in said(client, "/board/test/editions/1/?sort=absolute", 400)
+    assert "AE" in page_text(client, "/board/test/?sort=-absolute_far&columns=absolute")
+    assert "cannot be sorted by 'absolute'" in page_text(client, "/board/test/editions/1/?sort=absolute", 400)
 
     # Comparison and charts.
     ids = [row["method_id"] for row in scored[:2]]
     query = f"split=test&m={ids[0]}&m={ids[1]}"
-    said(client, f"/compare/?{query}")
+    page_text(client, f"/compare/?{query}")
     builders.infer_all()
     pair = document(client, f"/api/v1/compare?{query}")["pairs"][0]
     assert list(pair["differences"]) == names
     assert "AE" in pair["differences"]["absolute"]["sentence"]
-    assert "20–60 s" in said(client, f"/compare/?{query}")
-    charts = said(client, "/board/test/charts/")
+    assert "20–60 s" in page_text(client, f"/compare/?{query}")
+    charts = page_text(client, "/board/test/charts/")
     assert "AE, s" in charts
     assert "far" in charts
 
@@ -130,24 +130,24 @@ def test_a_further_range_and_a_third_metric_stand_wherever_their_edition_is_show
     assert "AE s, lower is better; TTC ranges in s: c 0–3, s 3–6, l 6–20, n −20–0, f 20–60" in table
 
     # Method, submission, analysis, receipt.
-    assert "Absolute TTC error" in said(client, f"/methods/{far.method_id}/")
+    assert "Absolute TTC error" in page_text(client, f"/methods/{far.method_id}/")
     api = client_of(owner)
-    told = document(api, f"/api/v1/submissions/{far.pk}")
-    assert list(told["scores"]) == names
-    assert list(told["counts"]) == list(FAR.range_names)
+    answer = document(api, f"/api/v1/submissions/{far.pk}")
+    assert list(answer["scores"]) == names
+    assert list(answer["counts"]) == list(FAR.range_names)
     assert "AE_f" in "\n".join(
-        result_in_words(told["scores"], counts=told["counts"], n_out_of_range=0, truncated={})
+        result_in_words(answer["scores"], counts=answer["counts"], n_out_of_range=0, truncated={})
     )
     client.force_login(owner)
-    assert "MiD, RTE and AE (each overall, crucial" in said(client, f"/submissions/{far.pk}/")
+    assert "MiD, RTE and AE (each overall, crucial" in page_text(client, f"/submissions/{far.pk}/")
 
-    assert "AE" in said(client, "/submissions/")
-    assert "AE s" in said(client, f"/submissions/{far.pk}/analysis/")
-    assert "far" in said(client, "/board/test/editions/2/")
+    assert "AE" in page_text(client, "/submissions/")
+    assert "AE s" in page_text(client, f"/submissions/{far.pk}/analysis/")
+    assert "far" in page_text(client, "/board/test/editions/2/")
     receipt = api.get(f"/api/v1/submissions/{far.pk}/receipt").content
     keys = receipts.read_keys(Client().get(receipts.KEYS_PATH).content)
-    assert receipts.verify(receipt, keys).scores == told["scores"]
-    assert receipts.verify(receipt, keys).counts == told["counts"]
+    assert receipts.verify(receipt, keys).scores == answer["scores"]
+    assert receipts.verify(receipt, keys).counts == answer["counts"]
 
 
 def test_what_was_scored_under_the_first_protocol_stays_as_it_is(
@@ -159,7 +159,7 @@ def test_what_was_scored_under_the_first_protocol_stays_as_it_is(
     assert again.content == old_receipt
     former = document(client, "/api/v1/splits/test/editions/1/board")
     assert all(tuple(row["scores"]) == SCORE_NAMES for row in former["entries"])
-    page = said(client, "/board/test/editions/1/")
+    page = page_text(client, "/board/test/editions/1/")
     assert "AE" not in re.findall(r"\w+", page)
     assert "far" not in re.findall(r"\w+", page)
     header = client.get("/board/test/editions/1.csv").content.decode().splitlines()[0]

@@ -23,7 +23,7 @@ N_SUBMISSIONS = 150
 
 @pytest.fixture
 def edition(benchmark: None, tmp_path: Path) -> Edition:
-    """An edition for which more submissions wait to be scored anew than one batch holds."""
+    """An edition with more submissions waiting to be scored again than one batch holds."""
     path = builders.truth_csv(tmp_path / "truth-test.csv")
     edition = ground_truth.import_truth(split_name="test", path=path, now=timezone.now())
     truth = truth_values.load(edition.ground_truth_id)
@@ -40,8 +40,8 @@ def assert_all_scored_once(edition: Edition) -> None:
     truth = truth_values.load(edition.ground_truth_id)
     rows = Evaluation.objects.filter(edition=edition).select_related("submission__method")
     assert {row.status for row in rows} == {Status.SCORED}
-    found = {row.submission.method.name: flat_scores(row) for row in rows}
-    assert found == {
+    scores_by_method = {row.submission.method.name: flat_scores(row) for row in rows}
+    assert scores_by_method == {
         crowd.method_name(number): crowd.published_scores(truth, number) for number in range(N_SUBMISSIONS)
     }
     assert Score.objects.count() == N_SUBMISSIONS * len(evaluator.SCORE_NAMES)

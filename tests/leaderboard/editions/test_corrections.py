@@ -31,7 +31,7 @@ from tests.editions import FACTORS, board_now, corrected, open_edition, publish,
 pytestmark = pytest.mark.slow
 
 
-def test_opening_queues_every_standing_submission_once_and_changes_nothing_public(
+def test_opening_queues_every_active_submission_once_and_changes_nothing_public(
     entries: list[Submission], tmp_path: Path
 ) -> None:
     before = board_now()
@@ -57,15 +57,15 @@ def test_rescoring_gives_what_the_evaluator_gives_without_reading_the_file_again
     truth = read_truth(path)
     old = truth_values.load(Split.objects.get(pk="test").published_edition.ground_truth_id)
     for submission, factor in zip(entries, FACTORS, strict=True):
-        found = Evaluation.objects.get(submission=submission, edition=edition)
+        evaluation = Evaluation.objects.get(submission=submission, edition=edition)
         values = Predictions.from_arrays(
             ttc_s=old.ttc_s * factor, manifest=truth.manifest, digest=submission.digest
         )
         report = evaluate(values, truth, keep_bags=True)
         expected = {name: rounded(value, decimals=1) for name, value in report.flat().items()}
-        assert flat_scores(found) == expected
+        assert flat_scores(evaluation) == expected
         # To the last bit, also of what is not published.
-        assert found.report_digest == f"sha256:{hashlib.sha256(report.to_json().encode()).hexdigest()}"
+        assert evaluation.report_digest == f"sha256:{hashlib.sha256(report.to_json().encode()).hexdigest()}"
         assert report.bags is not None
         assert np.array_equal(recording_sums.load(edition, file=submission.sent_file), report.bags.sums)
 

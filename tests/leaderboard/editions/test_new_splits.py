@@ -92,8 +92,8 @@ def test_a_challenge_shares_ground_truth_and_has_its_own_deadline_quota_and_boar
     with pytest.raises(Exception, match="Your team has used 1 submission to challenge, its quota for 7 days"):
         builders.send(owner, builders.predictions(edition, factor=1.2), split="challenge")
     builders.send(owner, builders.predictions(edition, factor=1.2), split="test")
-    told = {each["split"]: each["same_truth_as"] for each in client.get("/api/v1/splits").json()}
-    assert (told["challenge"], told["test"]) == ("test", None)
+    same_truth_as = {each["split"]: each["same_truth_as"] for each in client.get("/api/v1/splits").json()}
+    assert (same_truth_as["challenge"], same_truth_as["test"]) == ("test", None)
 
 
 def test_a_corrected_board_leaves_a_challenge_on_the_same_truth_as_it_is_until_it_is_corrected_too(
@@ -134,7 +134,7 @@ def test_new_split_on_hidden_values_starts_off_the_pages_with_the_quota_of_the_t
 
 
 def filled_in(page: pages.Element) -> dict[str, str]:
-    """What a form has in its fields; no box of it is ticked."""
+    """The values of a form's fields; no box of it is ticked."""
     form = page.one("main").one("form")
     fields = [each.attributes for each in form.all("input") if each.attributes.get("type") != "checkbox"]
     values = {each["name"]: each.get("value", "") for each in fields}
@@ -253,9 +253,9 @@ def test_an_archived_split_keeps_its_board_and_takes_no_file(
     with pytest.raises(Refused, match="Submissions to val are closed: the split is archived"):
         builders.send(owner, b"{}", split="val")
     assert "Submissions to val are closed: the split is archived." in client.get("/board/val/").text
-    told = client.get("/api/v1/splits").json()
-    assert [each["split"] for each in told] == ["test", "demo", "val"]
-    assert (told[-1]["is_open"], told[-1]["is_archived"]) == (False, True)
+    split_rows = client.get("/api/v1/splits").json()
+    assert [each["split"] for each in split_rows] == ["test", "demo", "val"]
+    assert (split_rows[-1]["is_open"], split_rows[-1]["is_archived"]) == (False, True)
 
 
 def test_a_split_that_is_switched_off_is_on_no_page_form_list_or_sitemap(
@@ -306,8 +306,8 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
         [line] = pages.page(visitor.get(address)).all("p", class_="announcement")
         assert line.text == text
     assert keeper.get("/submit/").text.count("Maintenance &lt;b&gt;today") == 1
-    told = visitor.get("/api/v1/splits").json()
-    assert {each["announcement"] for each in told} == {text}
+    split_rows = visitor.get("/api/v1/splits").json()
+    assert {each["announcement"] for each in split_rows} == {text}
     assert AuditEvent.objects.get(noun="SiteAnnouncement").details["text"] == text
     assert text in pages.get(keeper, page).one("main").one("input", id="id_announcement").attributes["value"]
     change("val", announcement="Val only", announcement_ends_at=timezone.now() + timedelta(hours=1))

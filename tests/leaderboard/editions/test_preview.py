@@ -27,28 +27,28 @@ def test_preview_compares_entry_by_entry(entries: list[Submission], tmp_path: Pa
     path = corrected(tmp_path, factor=1.3)
     edition = open_edition(path)
     builders.score_all()
-    found = preview.preview(edition)
+    comparison = preview.preview(edition)
     truth = read_truth(path)
-    assert found.truth == TruthChange(n_added=0, n_removed=0, n_changed=5, n_renumbered=0)
-    assert found.replaces == 1
-    old_truth = truth_values.load(found.published.ground_truth_id)
-    for change in found.changes:
+    assert comparison.truth == TruthChange(n_added=0, n_removed=0, n_changed=5, n_renumbered=0)
+    assert comparison.replaces == 1
+    old_truth = truth_values.load(comparison.published.ground_truth_id)
+    for change in comparison.changes:
         submission = Submission.objects.get(pk=change.submission_id)
         assert change.old == offline(submission, old_truth)
         assert change.new == offline(submission, truth)
         for name, value in change.delta.items():
             assert value == round(change.new[name] - change.old[name], 2)
     old_ranks = {entry.submission_id: entry.rank for entry in board_now().entries if entry.submission_id}
-    assert {c.submission_id: c.old_rank for c in found.changes} == old_ranks
+    assert {c.submission_id: c.old_rank for c in comparison.changes} == old_ranks
 
 
 def test_preview_says_what_becomes_rejected_and_why(entries: list[Submission], tmp_path: Path) -> None:
     edition = open_edition(extended(tmp_path))
     builders.score_all()
-    found = preview.preview(edition)
-    assert found.n_newly_rejected == 4
-    assert found.truth == TruthChange(n_added=1, n_removed=0, n_changed=0, n_renumbered=0)
-    for change in found.changes:
+    comparison = preview.preview(edition)
+    assert comparison.n_newly_rejected == 4
+    assert comparison.truth == TruthChange(n_added=1, n_removed=0, n_changed=0, n_renumbered=0)
+    for change in comparison.changes:
         assert change.new_status == Status.REJECTED
         assert change.problems[0]["message"].startswith("1 sequence has no value, added by a correction")
         assert change.rank_change > 0
@@ -99,7 +99,7 @@ def test_the_command_opens_an_edition_follows_it_and_says_where_to_publish(
     call_command("open_edition", "test", "--truth", str(corrected(tmp_path, factor=1.3)))
     builders.score_all()
     call_command("open_edition", "test", "--truth", str(corrected(tmp_path, factor=1.3)), "--wait")
-    said = capsys.readouterr().out
-    assert "100 %  4 of 4: 4 scored, 0 rejected, 0 with a system error" in said
-    assert "5 changed; 0 sequences have another anno_id." in said
-    assert said.rstrip().endswith("/maintain/test/editions/2/")
+    output = capsys.readouterr().out
+    assert "100 %  4 of 4: 4 scored, 0 rejected, 0 with a system error" in output
+    assert "5 changed; 0 sequences have another anno_id." in output
+    assert output.rstrip().endswith("/maintain/test/editions/2/")

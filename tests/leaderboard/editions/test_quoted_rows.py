@@ -28,9 +28,9 @@ def representations(client: Client, at: datetime) -> dict[str, bytes]:
     past = [f"/board/test{form}?at={moment}" for form in ("/", ".csv", ".tex", ".md")]
     api = [f"/api/v1/splits/test/board?at={moment}", "/api/v1/splits/test/editions/1/board"]
     addresses = [*past, *api, *FORMS, "/board/test/editions/1.md", "/board/test/?at=2020-01-01"]
-    found = {address: client.get(address) for address in addresses}
-    assert {response.status_code for response in found.values()} == {200}
-    return {address: response.content for address, response in found.items()}
+    responses = {address: client.get(address) for address in addresses}
+    assert {response.status_code for response in responses.values()} == {200}
+    return {address: response.content for address, response in responses.items()}
 
 
 def on_board() -> dict[str, float | None]:
@@ -109,7 +109,7 @@ def import_paper(document: dict[str, Any]) -> splits.Imported:
 
 
 @pytest.mark.usefixtures("benchmark")
-def test_a_document_is_imported_once_and_another_content_replaces_only_when_told() -> None:
+def test_a_document_is_imported_once_and_another_content_replaces_only_on_demand() -> None:
     assert import_paper(paper("later", mid=1.0)).added
     assert import_paper(paper("later", mid=1.0)).unchanged
     assert AuditEvent.objects.filter(verb="imported").count() == 1
@@ -150,7 +150,7 @@ def test_a_document_that_is_none_is_refused_in_words(change: dict[str, Any], sen
     assert PublishedResult.objects.count() == n_before
 
 
-def test_the_page_imports_a_paper_with_missing_values_and_says_every_problem_with_its_place(
+def test_the_page_imports_a_paper_with_missing_values_and_says_where_every_problem_is(
     keeper: Client, edition: Edition
 ) -> None:
     def send(text: bytes, **more: str) -> Any:

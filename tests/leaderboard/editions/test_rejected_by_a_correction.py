@@ -32,7 +32,7 @@ def sent(edition: Edition, owner: User) -> Submission:
 
 @pytest.fixture
 def adding(sent: Submission, tmp_path: Path) -> Edition:
-    """An edition beside the board with one sequence more, in which the submission is rejected."""
+    """An edition in preparation with one sequence more, in which the submission is rejected."""
     second = open_edition(extended(tmp_path))
     builders.score_all()
     return second
@@ -69,8 +69,8 @@ def test_the_slot_is_given_back_for_as_long_as_the_board_rejects_the_entry(
 ) -> None:
     assert (left(owner).used, left(owner).is_open) == (1, False)
     publish(adding, leave_out=True)
-    found = left(owner)
-    assert (found.used, found.n_rejected, found.is_open) == (0, 0, True)
+    quota = left(owner)
+    assert (quota.used, quota.n_rejected, quota.is_open) == (0, 0, True)
     new = builders.submit(owner, builders.predictions(adding), method="Foo")
     builders.score_all()
     assert progress_of(new).state == Status.SCORED
@@ -87,10 +87,10 @@ def test_the_words_are_true_wherever_they_stand(
     assert "no submissions yet" not in board
     assert "Edition 2 has no scored submission yet. 1 submission keeps its result in former editions" in board
     client.force_login(owner)
-    said = "Edition 2 cannot score this file. It keeps its result in edition 1, and your quota is refunded."
+    text = "Edition 2 cannot score this file. It keeps its result in edition 1, and your quota is refunded."
     page = assert_sound(client.get(f"/submissions/{sent.pk}/"))
     outcome = page.one("div", id="outcome").text
-    assert said in outcome
+    assert text in outcome
     assert "problem in the file" not in outcome
     progress = progress_of(Submission.objects.get(pk=sent.pk))
-    assert (progress.sentence, progress.kept_in) == (said, 1)
+    assert (progress.sentence, progress.kept_in) == (text, 1)

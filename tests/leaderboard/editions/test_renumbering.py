@@ -25,7 +25,7 @@ pytestmark = pytest.mark.slow
 
 HEAD = "anno_id,bag_stamp,cam_id,ts,track_id,ttc"
 Row = list[str]
-Said = dict[str, float]  # natural key to seconds
+ValuesByKey = dict[str, float]  # natural key to seconds
 
 
 def rows_of(path: Path) -> list[Row]:
@@ -58,27 +58,27 @@ def inserted(folder: Path) -> Path:
     return numbered(folder / "inserted.csv", [*new, *rows_of(folder / "truth-test.csv")])
 
 
-def said_by(data: bytes, manifest: Manifest) -> Said:
-    """What the file says of each sequence, read with this manifest."""
+def values_by_key(data: bytes, manifest: Manifest) -> ValuesByKey:
+    """The value of each sequence in the file, read with this manifest."""
     values = read_predictions(data, manifest=manifest).ttc_s.tolist()
     return dict(zip(manifest.natural_keys, values, strict=True))
 
 
-def report(said: Said, path: Path) -> Report:
-    """What the evaluator alone makes of these values, from a file with natural keys."""
+def report(values: ValuesByKey, path: Path) -> Report:
+    """The report of the evaluator alone on these values, from a file with natural keys."""
     truth = read_truth(path)
-    file = json.dumps({key: said[key] for key in truth.manifest.natural_keys}).encode()
+    file = json.dumps({key: values[key] for key in truth.manifest.natural_keys}).encode()
     return evaluate(read_predictions(file, manifest=truth.manifest), truth, keep_bags=True)
 
 
-def offline(said: Said, path: Path) -> dict[str, float | None]:
-    return {name: rounded(value, decimals=1) for name, value in report(said, path).flat().items()}
+def offline(values: ValuesByKey, path: Path) -> dict[str, float | None]:
+    return {name: rounded(value, decimals=1) for name, value in report(values, path).flat().items()}
 
 
 def scores(submission: Submission, edition: Edition) -> Mapping[str, float | None]:
-    found = submission.evaluations.get(edition=edition)
-    assert found.status == Status.SCORED, found.problems
-    return flat_scores(found)
+    evaluation = submission.evaluations.get(edition=edition)
+    assert evaluation.status == Status.SCORED, evaluation.problems
+    return flat_scores(evaluation)
 
 
 def first() -> Edition:
@@ -86,7 +86,7 @@ def first() -> Edition:
 
 
 @pytest.fixture
-def sent(edition: Edition, owner: User, tmp_path: Path) -> dict[Submission, Said]:
+def sent(edition: Edition, owner: User, tmp_path: Path) -> dict[Submission, ValuesByKey]:
     """Two scored files, and what each says: scale ratios by anno_id, seconds by natural key."""
     truth = read_truth(tmp_path / "truth-test.csv")
     manifest, rng = truth.manifest, np.random.default_rng(0)
@@ -99,14 +99,14 @@ def sent(edition: Edition, owner: User, tmp_path: Path) -> dict[Submission, Said
         for content in ({"unit": "scale_ratio", "fps": 10, "predictions": by_id}, by_key)
     ]
     made = {
-        builders.submit(owner, each, method=f"Method {i}"): said_by(each, manifest)
+        builders.submit(owner, each, method=f"Method {i}"): values_by_key(each, manifest)
         for i, each in enumerate(data)
     }
     builders.score_all()
     return made
 
 
-def forget_kept_values(sent: dict[Submission, Said]) -> None:
+def forget_kept_values(sent: dict[Submission, ValuesByKey]) -> None:
     for submission in sent:
         manifest, digest = submission.manifest_digest, submission.digest
         files.store().delete(files.aligned_name(manifest_digest=manifest, digest=digest))
@@ -114,25 +114,25 @@ def forget_kept_values(sent: dict[Submission, Said]) -> None:
 
 @pytest.mark.parametrize("way", ["from kept values", "from the files"])
 def test_scores_change_exactly_as_an_offline_score_by_natural_keys_says(
-    sent: dict[Submission, Said], tmp_path: Path, way: str
+    sent: dict[Submission, ValuesByKey], tmp_path: Path, way: str
 ) -> None:
     editions = {change: open_edition(change(tmp_path)) for change in (permuted, dropped, inserted)}
     if way == "from the files":
         forget_kept_values(sent)
     builders.score_all()
-    for submission, said in sent.items():
+    for submission, values in sent.items():
         assert scores(submission, editions[permuted]) == scores(submission, first())
-        assert scores(submission, editions[permuted]) == offline(said, tmp_path / "permuted.csv")
-        assert scores(submission, editions[dropped]) == offline(said, tmp_path / "dropped.csv")
+        assert scores(submission, editions[permuted]) == offline(values, tmp_path / "permuted.csv")
+        assert scores(submission, editions[dropped]) == offline(values, tmp_path / "dropped.csv")
         assert scores(submission, editions[dropped]) != scores(submission, first())
         # Another numbering is no other truth: neither are the sums, of which intervals are made.
         before, after = (
             recording_sums.sums_of(each, file=submission.sent_file) for each in (first(), editions[permuted])
         )
         assert after == pytest.approx(before, rel=1e-12)
-    for found in Evaluation.objects.filter(edition=editions[inserted]):
-        assert (found.status, found.n_problems) == (Status.REJECTED, 3)
-        [problem] = found.problems
+    for evaluation in Evaluation.objects.filter(edition=editions[inserted]):
+        assert (evaluation.status, evaluation.n_problems) == (Status.REJECTED, 3)
+        [problem] = evaluation.problems
         assert (problem["code"], problem["where"]) == ("missing-keys", "/0000~19~1700000000~15")
         assert problem["message"].startswith(
             "3 sequences have no value, added by a correction after the file was sent: "
@@ -144,7 +144,7 @@ def test_scores_change_exactly_as_an_offline_score_by_natural_keys_says(
 
 
 def test_the_same_bytes_for_two_manifests_are_two_submissions_that_are_never_mixed_up(
-    sent: dict[Submission, Said], owner: User, tmp_path: Path
+    sent: dict[Submission, ValuesByKey], owner: User, tmp_path: Path
 ) -> None:
     path = permuted(tmp_path)
     second = open_edition(path)
@@ -158,20 +158,20 @@ def test_the_same_bytes_for_two_manifests_are_two_submissions_that_are_never_mix
     assert new != old
     assert builders.submit(owner, data, method="Method 0") == new
     builders.score_all()
-    meant = {old: sent[old], new: said_by(data, read_manifest(path))}
+    meant = {old: sent[old], new: values_by_key(data, read_manifest(path))}
     roll_back()
     builders.score_all()
-    for submission, said in meant.items():
-        assert scores(submission, second) == offline(said, path)
-        assert scores(submission, first()) == offline(said, tmp_path / "truth-test.csv")
-        expected = report(said, path).bags
+    for submission, values in meant.items():
+        assert scores(submission, second) == offline(values, path)
+        assert scores(submission, first()) == offline(values, tmp_path / "truth-test.csv")
+        expected = report(values, path).bags
         assert expected is not None
         assert recording_sums.sums_of(second, file=submission.sent_file) == pytest.approx(expected.sums)
     assert scores(old, second) != scores(new, second)
 
 
 def test_a_file_for_the_corrected_manifest_is_scored_in_the_former_edition_too(
-    sent: dict[Submission, Said], owner: User, tmp_path: Path
+    sent: dict[Submission, ValuesByKey], owner: User, tmp_path: Path
 ) -> None:
     path = inserted(tmp_path)
     second = open_edition(path)
@@ -183,9 +183,9 @@ def test_a_file_for_the_corrected_manifest_is_scored_in_the_former_edition_too(
     builders.score_all()
     roll_back()
     builders.score_all()
-    said = said_by(json.dumps(values).encode(), truth.manifest)
-    assert scores(late, second) == offline(said, path)
-    assert scores(late, first()) == offline(said, tmp_path / "truth-test.csv")
+    natural_values = values_by_key(json.dumps(values).encode(), truth.manifest)
+    assert scores(late, second) == offline(natural_values, path)
+    assert scores(late, first()) == offline(natural_values, tmp_path / "truth-test.csv")
 
 
 def test_a_damaged_manifest_is_our_fault_and_not_the_files(
@@ -198,6 +198,6 @@ def test_a_damaged_manifest_is_our_fault_and_not_the_files(
     stored.write_bytes(stored.read_bytes().replace(b"0001,1,", b"0001,2,", 1))
     second = open_edition(permuted(tmp_path))
     builders.score_all()
-    found = old.evaluations.get(edition=second)
-    assert (found.status, found.n_infrastructure_strikes, found.problems) == (Status.QUEUED, 1, [])
-    assert "has another content" in found.last_error
+    row = old.evaluations.get(edition=second)
+    assert (row.status, row.n_infrastructure_strikes, row.problems) == (Status.QUEUED, 1, [])
+    assert "has another content" in row.last_error

@@ -1,4 +1,4 @@
-"""What stands beneath the leaderboard fails: a clear answer on every door, and nothing half kept."""
+"""Failures beneath the leaderboard: every entry point answers clearly, and no file or row is half kept."""
 
 import errno
 import gc

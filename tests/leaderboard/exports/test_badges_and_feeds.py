@@ -1,4 +1,4 @@
-"""What stands elsewhere: badges in READMEs, feeds in readers, and what links to us show."""
+"""The board on other sites: badges in READMEs, feeds in readers, and previews of links."""
 
 import re
 from datetime import timedelta
@@ -35,7 +35,7 @@ def by_hand(method: Method, **values: object) -> None:
 
 
 def badge(client: Client, method: Method, query: str = "") -> str:
-    """What a badge says; its drawing is well formed, and says the same to those who cannot see it."""
+    """The text of a badge; its drawing is well formed, and has the same text for screen readers."""
     response = client.get(f"/methods/{method.pk}/badge.svg{query}")
     assert response.status_code == 200
     assert response["Content-Type"] == "image/svg+xml"
@@ -176,15 +176,15 @@ def test_links_to_boards_and_methods_show_what_they_are(methods: list[Method], c
         (f"/compare/?m={first.pk}&m={second.pk}", "Comparison on test"),
     ):
         head = pages.page(client.get(address)).one("head")
-        said = {
+        properties = {
             m.attributes["property"]: m.attributes["content"]
             for m in head.all("meta")
             if "property" in m.attributes
         }
-        assert said["og:title"] == title
-        assert said["og:url"].endswith(address)
-        assert said["og:type"] == "website"
-        assert said["og:description"]
+        assert properties["og:title"] == title
+        assert properties["og:url"].endswith(address)
+        assert properties["og:type"] == "website"
+        assert properties["og:description"]
     feeds = [
         a.attributes["href"]
         for a in pages.page(client.get("/board/test/")).all("link", type="application/atom+xml")

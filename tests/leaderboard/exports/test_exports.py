@@ -64,8 +64,8 @@ def page_numbers(client: Client, query: str = "") -> list[list[str]]:
 
 
 def _number(text: str) -> str:
-    found = re.match(r"[0-9.]+|–", text)
-    return found[0] if found else text
+    match = re.match(r"[0-9.]+|–", text)
+    return match[0] if match else text
 
 
 # --- the same as the page ----------------------------------------------------------------------------------
@@ -217,12 +217,12 @@ def test_bibtex_has_no_unbalanced_brace_and_no_key_twice(hostile: list[Method], 
 @pytest.fixture
 def pdflatex() -> str:
     """The TeX that Debian calls texlive-latex-base; CI has it."""
-    found = shutil.which("pdflatex")
-    if found is None:
+    program = shutil.which("pdflatex")
+    if program is None:
         if REQUIRED:
             pytest.fail("pdflatex is not installed")
         pytest.skip("pdflatex is not installed (Debian: texlive-latex-base, texlive-latex-recommended)")
-    return found
+    return program
 
 
 def test_latex_and_bibtex_compile_with_any_name(

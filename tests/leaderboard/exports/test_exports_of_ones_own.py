@@ -38,7 +38,7 @@ def own(edition: Edition, owner: User) -> list[Method]:
 
 @pytest.mark.parametrize("query", ["", "?intervals=1", "?q=e&sort=-mid", "?mine=0"])
 @pytest.mark.parametrize("form", SUFFIXES)
-def test_whoever_takes_a_board_along_takes_what_everybody_sees(
+def test_an_export_of_a_board_has_what_everybody_sees(
     own: list[Method], owner: User, teammate: User, stranger: User, client: Client, form: str, query: str
 ) -> None:
     for path in ("/board/test", "/board/test/editions/1"):
@@ -95,10 +95,10 @@ def test_nobody_s_own_rows_are_a_clear_refusal(own: list[Method], form: str, cli
 
 
 def links(client: Client, address: str = "/board/test/") -> dict[str, list[str]]:
-    """What a page offers: the addresses, for everyone and with one's own rows."""
+    """The addresses of a page's exports: for everyone, and with one's own rows."""
     menu = pages.page(client.get(address)).one("details", class_="exports")
-    found = {name: menu.all("div", class_=name) for name in ("public", "with-own")}
-    return {name: [a.attributes["href"] for a in parts[0].all("a")] for name, parts in found.items() if parts}
+    divs = {name: menu.all("div", class_=name) for name in ("public", "with-own")}
+    return {name: [a.attributes["href"] for a in parts[0].all("a")] for name, parts in divs.items() if parts}
 
 
 def test_the_page_offers_every_form_with_and_without_intervals(own: list[Method], client: Client) -> None:
@@ -134,9 +134,9 @@ def test_the_page_offers_one_s_own_rows_to_who_has_some(
     assert client.get("/board/test.json?mine=perhaps", follow=True).status_code == 400
     assert with_own[:5] == [f"/board/test.{form}?mine=1" for form in ("csv", "json", "tex", "md", "bib")]
     document = client.get(with_own[1], follow=True).json()
-    told = {row["method"]: (row["visibility"], row["pseudonym"]) for row in document["entries"]}
-    assert told["Secretissimo"] == ("PRIVATE", None)
-    assert told["Maskenball"] == ("ANONYMOUS", own[1].pseudonym)
-    assert told[own[3].pseudonym] == ("ANONYMOUS", None)
+    shown_as = {row["method"]: (row["visibility"], row["pseudonym"]) for row in document["entries"]}
+    assert shown_as["Secretissimo"] == ("PRIVATE", None)
+    assert shown_as["Maskenball"] == ("ANONYMOUS", own[1].pseudonym)
+    assert shown_as[own[3].pseudonym] == ("ANONYMOUS", None)
     # Where no such row fits the filter there is nothing to add.
     assert links(client, "/board/test/?q=Offenbach").keys() == {"public"}

@@ -24,7 +24,7 @@ def write(export: Export) -> str:
 
 @pytest.fixture
 def _added(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """What somebody does who adds a format: a writer, and this row."""
+    """Add a format as a developer does: a writer, and this row."""
     row = Format(name="names", title="Names", suffix="lst", media_type="text/plain", write=write)
     with monkeypatch.context() as patched:
         patched.setattr(formats, "FORMATS", (*formats.FORMATS, row))

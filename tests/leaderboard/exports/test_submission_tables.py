@@ -52,9 +52,9 @@ def test_parquet_has_the_rows_of_csv(entries: list[Submission], tmp_path: Path) 
     parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
     for name in ("all.csv", "all.parquet"):
         call_command("export_submissions", str(tmp_path / name), stdout=StringIO())
-    found = parquet.read_table(tmp_path / "all.parquet").to_pylist()
-    assert [row["submission"] for row in found] == [row["submission"] for row in read(tmp_path / "all.csv")]
-    assert [row["mid"] for row in found] == [float(row["mid"]) for row in read(tmp_path / "all.csv")]
+    rows = parquet.read_table(tmp_path / "all.parquet").to_pylist()
+    assert [row["submission"] for row in rows] == [row["submission"] for row in read(tmp_path / "all.csv")]
+    assert [row["mid"] for row in rows] == [float(row["mid"]) for row in read(tmp_path / "all.csv")]
 
 
 @pytest.mark.parametrize(

@@ -55,8 +55,8 @@ def look_back() -> None:
     SweepBeat.objects.update_or_create(id=1, defaults={"notices_at": timezone.now() - HOUR})
 
 
-def told() -> list[tuple[str, str]]:
-    """Queue what is due, and say whom it told of what."""
+def queue_due_mails() -> list[tuple[str, str]]:
+    """Queue the mails that are due; return recipient and kind of each that is not sent yet."""
     notices.queue_due(now=timezone.now())
     return sorted(Mail.objects.filter(ended_at=None).values_list("recipient", "kind"))
 
@@ -120,21 +120,21 @@ def test_a_superuser_can_sign_in_without_a_mail(away: Settings, client: Client) 
 # --- notices ---------------------------------------------------------------------------------------------
 
 
-def test_whoever_sends_a_file_on_the_site_is_told_once_what_it_came_to(edition: Edition, owner: User) -> None:
+def test_a_file_sent_on_the_site_brings_one_mail_with_its_outcome(edition: Edition, owner: User) -> None:
     look_back()
     submission = builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
-    assert told() == []
+    assert queue_due_mails() == []
     builders.score_all()
-    assert told() == [(owner.email, "scored")]
+    assert queue_due_mails() == [(owner.email, "scored")]
     outbox.work_off(now=timezone.now())
     [sent] = mail.outbox
     assert sent.subject == "[TSTTC leaderboard] Foo on test is scored"
     assert f"/submissions/{submission.pk}/" in sent.body
     assert "Choose which mails you get: http://127.0.0.1:8000/mails/" in sent.body
-    assert told() == []
+    assert queue_due_mails() == []
 
 
-def test_nobody_is_told_what_they_switched_off_nor_after_they_left_the_team(
+def test_nobody_gets_mails_that_they_switched_off_or_of_a_team_that_they_left(
     edition: Edition, owner: User, signed_in: Client
 ) -> None:
     look_back()
@@ -142,7 +142,7 @@ def test_nobody_is_told_what_they_switched_off_nor_after_they_left_the_team(
     builders.score_all()
     answer = signed_in.post("/mails/", {"wanted": ["edition", "token"]})
     assert answer.status_code == 302
-    assert told() == []
+    assert queue_due_mails() == []
     owner.refresh_from_db()
     assert notices.muted_by(owner) == {"scored", "deadline", "announcement"}
     page = signed_in.get("/mails/").content.decode()
@@ -151,10 +151,10 @@ def test_nobody_is_told_what_they_switched_off_nor_after_they_left_the_team(
     notices.choose(user=owner, wanted=MailKind.values)
     owner.membership.delete()
     look_back()
-    assert told() == []
+    assert queue_due_mails() == []
 
 
-def test_the_teams_of_a_board_are_told_of_its_new_edition(
+def test_the_teams_of_a_board_get_a_mail_about_its_new_edition(
     rescored: Edition, owner: User, stranger: User
 ) -> None:
     look_back()
@@ -162,7 +162,7 @@ def test_the_teams_of_a_board_are_told_of_its_new_edition(
     ground_truth.make_board(
         edition=rescored, kind=Publication.Kind.PUBLISHED, reason="A label.", now=timezone.now(), actor=None
     )
-    of_edition = {row for row in told() if row[1] == "edition"}
+    of_edition = {row for row in queue_due_mails() if row[1] == "edition"}
     assert (owner.email, "edition") in of_edition
     assert stranger.email not in {recipient for recipient, _ in of_edition}
     text = Mail.objects.get(kind="edition", user=owner).text
@@ -170,7 +170,7 @@ def test_the_teams_of_a_board_are_told_of_its_new_edition(
     assert "/board/test/editions/" in text
 
 
-def test_tokens_that_end_and_splits_that_close_are_told_to_those_whom_it_concerns(
+def test_tokens_that_end_and_splits_that_close_bring_mails_to_those_concerned(
     edition: Edition, owner: User, stranger: User
 ) -> None:
     now = timezone.now()
@@ -178,10 +178,10 @@ def test_tokens_that_end_and_splits_that_close_are_told_to_those_whom_it_concern
         builders.token(user)
         row = ApiToken.objects.order_by("-created").first()
         ApiToken.objects.filter(pk=row.pk).update(created=now - created * DAY, expiry=now + ends * DAY)
-    assert told() == [(owner.email, "token")]
+    assert queue_due_mails() == [(owner.email, "token")]
     builders.submit(owner, builders.predictions(edition))
     Split.objects.filter(pk="test").update(closes_at=now + 2 * DAY)
-    assert told() == [(owner.email, "deadline"), (owner.email, "token")]
+    assert queue_due_mails() == [(owner.email, "deadline"), (owner.email, "token")]
     assert "closes on" in Mail.objects.get(kind="deadline").subject
 
 
@@ -201,7 +201,7 @@ def test_a_maintainer_previews_an_announcement_and_sends_it_once(
     assert not Mail.objects.exists()
     for words in ("The mail to 1 person is queued.", "Nothing was sent"):  # a double click
         assert words in keeper.post(address, draft | {"step": "send"}, follow=True).content.decode()
-    assert told() == [(owner.email, "announcement")]
+    assert queue_due_mails() == [(owner.email, "announcement")]
     assert Mail.objects.get().text.startswith("First.\n\nSecond <b>.\n\n--\n")
     event = AuditEvent.objects.get(verb="announced")
     assert event.details == {"subject": "Moved", "n_people": 1}
@@ -219,10 +219,10 @@ def test_only_proved_addresses_get_notices_where_addresses_are_proved(
     look_back()
     builders.submit(owner, builders.predictions(edition))
     builders.score_all()
-    assert told() == []
+    assert queue_due_mails() == []
     EmailAddress.objects.create(user=owner, email=owner.email, verified=True, primary=True)
     look_back()
-    assert told() == [(owner.email, "scored")]
+    assert queue_due_mails() == [(owner.email, "scored")]
 
 
 def test_a_program_asks_for_its_own_outcome(edition: Edition, owner: User) -> None:
@@ -230,7 +230,7 @@ def test_a_program_asks_for_its_own_outcome(edition: Edition, owner: User) -> No
     submission = builders.submit(owner, builders.predictions(edition))
     Submission.objects.filter(pk=submission.pk).update(via="API")
     builders.score_all()
-    assert told() == []
+    assert queue_due_mails() == []
 
 
 # --- faults of ours --------------------------------------------------------------------------------------

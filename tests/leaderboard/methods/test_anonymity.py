@@ -1,4 +1,4 @@
-"""When something happened to an anonymous method: everybody is told the day, and nothing finer."""
+"""Times of an anonymous method: everybody sees the day, and nothing finer."""
 
 import re
 from datetime import UTC, datetime, timedelta
@@ -41,14 +41,14 @@ def api_rows(client: Client, at: datetime | None = None) -> dict[str, dict[str, 
     return {entry["method"]: entry for entry in entries}
 
 
-def test_times_of_an_anonymous_method_are_told_by_the_day(client: Client, at_noon: Method) -> None:
+def test_times_of_an_anonymous_method_are_shown_by_the_day(client: Client, at_noon: Method) -> None:
     for withdrawn_at in (None, NOON + timedelta(minutes=1)):
         Submission.objects.update(withdrawn_at=withdrawn_at)
         builders.board_changed("test")
         answers = [client.get(address.format(method=at_noon.pk)) for address in ADDRESSES]
-        found = "".join(answer.text + repr(sorted(answer.items())) for answer in answers)
-        assert at_noon.pseudonym in found
-        assert re.findall(r"2026-01-02.12:3\d", found) == []
+        text = "".join(answer.text + repr(sorted(answer.items())) for answer in answers)
+        assert at_noon.pseudonym in text
+        assert re.findall(r"2026-01-02.12:3\d", text) == []
     assert api_rows(client)[at_noon.pseudonym]["withdrawn_at"] == "2026-01-02T00:00:00Z"
     Method.objects.update(visibility=Visibility.PUBLIC)
     builders.board_changed("test")

@@ -1,4 +1,4 @@
-"""What a team says of a method: typed, checked, shown, and what the board is filtered by."""
+"""Details of a method: typed, checked, shown, and filters of the board."""
 
 import json
 from typing import Any
@@ -32,20 +32,20 @@ WHOLE: dict[str, Any] = {
 }
 
 
-def of(name: str, *values: object) -> list[tuple[str, object]]:
+def pairs_of(name: str, *values: object) -> list[tuple[str, object]]:
     return [(name, value) for value in values]
 
 
 BAD = [
-    *of("n_frames", 1, 7, "six", 2.5, True, [], "²", float("inf")),
-    *of("cameras", "one", 1, {}),
-    *of("uses_nerf", "maybe", 1, "YES"),
-    *of("n_parameters", 0, 10**16, "1.5", "25 apples", "1,5M", "9" * 5000, 1.5, True),
-    *of("latency_ms", 0, "fast", "50 ms", float("nan"), 1e300, True, 10**400, []),
-    *of("paper_url", "javascript:alert(1)", 5),
-    *of("description", "x" * 2001, "a\x00b", "\ud800"),
+    *pairs_of("n_frames", 1, 7, "six", 2.5, True, [], "²", float("inf")),
+    *pairs_of("cameras", "one", 1, {}),
+    *pairs_of("uses_nerf", "maybe", 1, "YES"),
+    *pairs_of("n_parameters", 0, 10**16, "1.5", "25 apples", "1,5M", "9" * 5000, 1.5, True),
+    *pairs_of("latency_ms", 0, "fast", "50 ms", float("nan"), 1e300, True, 10**400, []),
+    *pairs_of("paper_url", "javascript:alert(1)", 5),
+    *pairs_of("description", "x" * 2001, "a\x00b", "\ud800"),
     ("pretraining", ["ImageNet"]),
-    *of("name", "", None, "a\u202eb", 5),
+    *pairs_of("name", "", None, "a\u202eb", 5),
 ]
 
 
@@ -76,7 +76,7 @@ def patch(client: Client, method: Method, user: User, body: Any) -> tuple[int, d
 # --- the verb ----------------------------------------------------------------------------------------------
 
 
-def test_everything_said_is_kept_and_taken_back_with_nothing(method: Method, owner: User) -> None:
+def test_every_detail_is_kept_and_taken_back_with_nothing(method: Method, owner: User) -> None:
     kept = editing.edit(method=method, changes=WHOLE, actor=owner)
     kept.refresh_from_db()
     assert {name: getattr(kept, name) for name in WHOLE} == WHOLE
@@ -165,21 +165,21 @@ def test_page_takes_the_details_and_shows_them(client: Client, method: Method, o
         assert words in shown
     client.force_login(owner)
     response = client.post(address, {**sent, "n_parameters": "25 apples", "latency_ms": "fast"})
-    said = pages.page(response).one("div", id="id_n_parameters_error").text
-    assert said == "Enter a whole number, e.g. 25,000,000 or 25M."
+    message = pages.page(response).one("div", id="id_n_parameters_error").text
+    assert message == "Enter a whole number, e.g. 25,000,000 or 25M."
 
 
 # --- the API -----------------------------------------------------------------------------------------------
 
 
 def test_program_says_and_reads_the_same(client: Client, method: Method, owner: User, stranger: User) -> None:
-    status, told = patch(client, method, owner, WHOLE)
+    status, answer = patch(client, method, owner, WHOLE)
     assert status == 200
-    details = {name: told["details"][name] for name in told["details"]}
+    details = {name: answer["details"][name] for name in answer["details"]}
     assert details == {name: WHOLE[name] for name in details}
     assert patch(client, method, stranger, {"n_frames": 2})[0] == 404
-    status, told = patch(client, method, owner, {"n_frames": None})
-    assert (status, told["details"]["n_frames"], told["description"]) == (200, None, "What it does.")
+    status, answer = patch(client, method, owner, {"n_frames": None})
+    assert (status, answer["details"]["n_frames"], answer["description"]) == (200, None, "What it does.")
     assert client.get("/api/v1/methods").status_code == 401
     headers = {"Authorization": f"Bearer {builders.token(owner)}"}
     assert [row["name"] for row in client.get("/api/v1/methods", headers=headers).json()] == ["Foo"]
@@ -201,8 +201,8 @@ def test_program_says_and_reads_the_same(client: Client, method: Method, owner: 
 def test_nonsense_is_refused_in_words(
     client: Client, method: Method, owner: User, body: Any, code: str
 ) -> None:
-    status, told = patch(client, method, owner, body)
-    assert (status, told["code"]) == ({"parse-error": 400, "too-large": 413}.get(code, 422), code)
+    status, answer = patch(client, method, owner, body)
+    assert (status, answer["code"]) == ({"parse-error": 400, "too-large": 413}.get(code, 422), code)
 
 
 # --- filters -----------------------------------------------------------------------------------------------
@@ -256,8 +256,8 @@ def test_a_filter_tells_nothing_of_what_an_anonymous_row_hides(
     veiled = builders.submit(owner, data, method="Veiled", visibility="ANONYMOUS").method
     builders.score_all()
     addresses = [
-        f"{place}?{name}={text}"
-        for place in ("/board/test/", "/api/v1/splits/test/board", "/board/test.csv")
+        f"{path}?{name}={text}"
+        for path in ("/board/test/", "/api/v1/splits/test/board", "/board/test.csv")
         for name in ("pretraining", "hardware")
         for text in ("Larks", "arks", "l")
     ]
@@ -278,10 +278,10 @@ def test_a_filter_tells_nothing_of_what_an_anonymous_row_hides(
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        *of("frames", "1", "²"),
+        *pairs_of("frames", "1", "²"),
         *(("cameras", "three"), ("nerf", "maybe"), ("paper", "\x00"), ("q", "x" * 81)),
-        *of("latency", "fast", "nan", "0", "1e999"),
-        *of("parameters", "many", "0", "0.0001", "-5", "25 GB", "٢٥M", "9" * 17),
+        *pairs_of("latency", "fast", "nan", "0", "1e999"),
+        *pairs_of("parameters", "many", "0", "0.0001", "-5", "25 GB", "٢٥M", "9" * 17),
     ],
 )
 def test_a_filter_that_is_none_is_named(client: Client, benchmark: None, name: str, value: str) -> None:

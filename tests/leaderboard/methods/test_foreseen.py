@@ -1,4 +1,4 @@
-"""What everybody would see of a method, told to its team's programs before they show it."""
+"""A team's program gets what everybody would see of a method, before it shows the method."""
 
 import json
 from typing import Any
@@ -48,9 +48,9 @@ def test_program_foresees_what_everybody_then_sees(
     moved = {row["method"]: (row["rank_before"], row["rank_after"]) for row in sight["moved"]}
     assert moved == {name: (rank, shown[name]["rank"]) for name, rank in before.items()}
     assert len(moved) == 6
-    told = anybody.get(f"/api/v1/methods/{method.pk}").json()
-    said = ("name", "team", "description", "paper_url", "code_url", "details")
-    assert {name: foreseen[name] for name in said} == {name: told[name] for name in said}
+    document = anybody.get(f"/api/v1/methods/{method.pk}").json()
+    fields = ("name", "team", "description", "paper_url", "code_url", "details")
+    assert {name: foreseen[name] for name in fields} == {name: document[name] for name in fields}
     hidden = [secret for secret in SECRETS if secret in json.dumps(foreseen)]
     assert (hidden == []) == (to == "ANONYMOUS")
 
@@ -65,8 +65,8 @@ def test_revealing_an_anonymous_method_moves_nobody(client: Client, method: Meth
 def test_what_a_method_cannot_become_is_not_foreseen(client: Client, method: Method, owner: User) -> None:
     token = builders.token(owner)
     for query in ("", "?as=", "?as=PRIVATE", "?as=public"):
-        status, told = foresee(client, method, token, query)
-        assert (status, told["code"], told["problems"][0]["where"]) == (400, "bad-visibility", "as")
+        status, answer = foresee(client, method, token, query)
+        assert (status, answer["code"], answer["problems"][0]["where"]) == (400, "bad-visibility", "as")
     change(method, "PUBLIC", owner)
-    status, told = foresee(client, method, token, "?as=ANONYMOUS")
-    assert (status, told["code"]) == (422, "shown-for-good")
+    status, answer = foresee(client, method, token, "?as=ANONYMOUS")
+    assert (status, answer["code"]) == (422, "shown-for-good")

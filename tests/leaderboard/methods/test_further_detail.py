@@ -11,7 +11,7 @@ pytestmark = pytest.mark.slow
 
 def test_a_detail_is_a_field_and_a_row_of_the_registry() -> None:
     """In a process of its own: what follows from the registry follows when it is imported."""
-    found = subprocess.run(
+    completed = subprocess.run(
         [
             *(sys.executable, "-m", "pytest", "-q", "-p", "no:xdist", "-p", "no:cacheprovider"),
             *("--nomigrations", "-p", "tests.leaderboard.methods.further_detail"),
@@ -22,5 +22,5 @@ def test_a_detail_is_a_field_and_a_row_of_the_registry() -> None:
         text=True,
         check=False,
     )
-    assert found.returncode == 0, found.stdout + found.stderr
-    assert "5 passed" in found.stdout
+    assert completed.returncode == 0, completed.stdout + completed.stderr
+    assert "5 passed" in completed.stdout

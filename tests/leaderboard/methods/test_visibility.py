@@ -90,8 +90,8 @@ def test_an_anonymous_method_shows_numbers_and_nothing_of_whose_it_is(
         assert (entry.description, entry.paper_url, entry.code_url) == ("", "", "")
         assert entry.details == stated(n_frames=6, latency_ms=12.5, cameras="ONE")
     assert pages.page(client.get(f"/methods/{method.pk}/")).one("h1").text == method.pseudonym
-    told = client.get(f"/api/v1/methods/{method.pk}").json()
-    assert (told["name"], told["team"], told["shown_at"]) == (method.pseudonym, "Anonymous", None)
+    document = client.get(f"/api/v1/methods/{method.pk}").json()
+    assert (document["name"], document["team"], document["shown_at"]) == (method.pseudonym, "Anonymous", None)
     for member in (owner, teammate):
         entry = rows(member)["Secret sauce"]
         assert (entry.pseudonym, entry.team, entry.is_visible_to_all) == (method.pseudonym, "Owls", True)
@@ -119,7 +119,7 @@ def test_a_board_as_of_a_time_shows_what_was_shown_then(method: Method, owner: U
 # --- leaving private ---------------------------------------------------------------------------------------
 
 
-def test_only_the_team_shows_a_method_and_it_is_told_to_the_trail(
+def test_only_the_team_shows_a_method_and_the_trail_records_it(
     method: Method, owner: User, teammate: User, stranger: User, maintainer: User
 ) -> None:
     for other in (stranger, maintainer):
@@ -131,8 +131,8 @@ def test_only_the_team_shows_a_method_and_it_is_told_to_the_trail(
     change(method, "PUBLIC", owner)
     assert BoardVersion.objects.get(split="test").number == number + 2
     events = AuditEvent.objects.filter(verb="shown").order_by("pk")
-    told = [(e.actor, e.details["from"], e.details["to"]) for e in events]
-    assert told == [(teammate, "PRIVATE", "ANONYMOUS"), (owner, "ANONYMOUS", "PUBLIC")]
+    changes = [(e.actor, e.details["from"], e.details["to"]) for e in events]
+    assert changes == [(teammate, "PRIVATE", "ANONYMOUS"), (owner, "ANONYMOUS", "PUBLIC")]
 
 
 @pytest.mark.parametrize(
@@ -231,23 +231,23 @@ def test_program_shows_a_method_when_it_says_that_it_means_it(
     client: Client, method: Method, owner: User, stranger: User
 ) -> None:
     token = builders.token(owner)
-    status, told = ask(client, method, token, {"visibility": "PUBLIC"})
-    assert (status, told["code"], told["problems"][0]["where"]) == (422, "not-confirmed", "confirm")
+    status, answer = ask(client, method, token, {"visibility": "PUBLIC"})
+    assert (status, answer["code"], answer["problems"][0]["where"]) == (422, "not-confirmed", "confirm")
     assert ask(client, method, builders.token(stranger), {"visibility": "PUBLIC", "confirm": True})[0] == 404
     reading = builders.token(owner, scopes=["read"])
     assert ask(client, method, reading, {"visibility": "PUBLIC", "confirm": True})[0] == 403
     of_one_split = builders.token(owner, split_name="test")
     assert ask(client, method, of_one_split, {"visibility": "PUBLIC", "confirm": True})[0] == 403
     later = (timezone.now() + timedelta(days=9)).isoformat()
-    status, told = ask(
+    status, answer = ask(
         client, method, token, {"visibility": "ANONYMOUS", "reveal_at": later, "confirm": True}
     )
-    assert (status, told["visibility"], told["name"]) == (200, "ANONYMOUS", "Secret sauce")
-    assert told["reveal_at"][:10] == later[:10]
-    status, told = ask(client, method, token, {"visibility": "PUBLIC", "confirm": True})
-    assert (status, told["visibility"], told["reveal_at"]) == (200, "PUBLIC", None)
-    status, told = ask(client, method, token, {"visibility": "PRIVATE", "confirm": True})
-    assert (status, told["code"]) == (422, "bad-value")
+    assert (status, answer["visibility"], answer["name"]) == (200, "ANONYMOUS", "Secret sauce")
+    assert answer["reveal_at"][:10] == later[:10]
+    status, answer = ask(client, method, token, {"visibility": "PUBLIC", "confirm": True})
+    assert (status, answer["visibility"], answer["reveal_at"]) == (200, "PUBLIC", None)
+    status, answer = ask(client, method, token, {"visibility": "PRIVATE", "confirm": True})
+    assert (status, answer["code"]) == (422, "bad-value")
 
 
 @pytest.mark.parametrize(
@@ -262,8 +262,8 @@ def test_program_shows_a_method_when_it_says_that_it_means_it(
 def test_nonsense_is_refused_and_changes_nothing(
     client: Client, method: Method, owner: User, body: str
 ) -> None:
-    status, told = ask(client, method, builders.token(owner), body)
-    assert status in {400, 422}, told
+    status, answer = ask(client, method, builders.token(owner), body)
+    assert status in {400, 422}, answer
     assert Method.objects.get().visibility == Visibility.PRIVATE
 
 

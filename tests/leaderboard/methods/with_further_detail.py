@@ -43,13 +43,13 @@ def test_the_form_asks_for_it_and_the_method_page_shows_it(
 def test_programs_read_it_and_change_it(client: Client, method: Method, owner: User) -> None:
     address = f"/api/v1/methods/{method.pk}"
     assert client.get(address).json()["details"]["optimizer"] == "Larksgrad"
-    told = client.patch(
+    response = client.patch(
         address,
         json.dumps({"optimizer": None}),
         content_type="application/json",
         headers={"Authorization": f"Bearer {builders.token(owner)}"},
     )
-    assert told.json()["details"]["optimizer"] == ""
+    assert response.json()["details"]["optimizer"] == ""
 
 
 @pytest.mark.usefixtures("method")
@@ -81,7 +81,7 @@ def test_nobody_reads_it_of_an_anonymous_method(client: Client, method: Method, 
     builders.board_changed("test")
     then = f"?at={timezone.now():%Y-%m-%dT%H:%M:%S.%fZ}"
     pages_of_it = [f"/methods/{method.pk}/", f"/api/v1/methods/{method.pk}", "/"]
-    boards = [f"{place}{query}" for place in (BOARD, API, "/board/test.csv") for query in ("", then)]
+    boards = [f"{path}{query}" for path in (BOARD, API, "/board/test.csv") for query in ("", then)]
     others = ["/board/test.tex", "/board/test.md"]
     for address in (*pages_of_it, *boards, *others):
         answer = client.get(address)

@@ -1,4 +1,4 @@
-"""Deletion of methods of which nothing was ever scored."""
+"""Deletion of methods that never had a scored submission."""
 
 import pytest
 from django.test import Client

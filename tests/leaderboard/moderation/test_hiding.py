@@ -46,8 +46,8 @@ def published(edition: Edition, owner: User, *, method: str = "Rude Name") -> Su
     return made
 
 
-def places(client: Client, name: str, *more: str) -> list[str]:
-    """Where visitors read this text."""
+def addresses_with(client: Client, name: str, *more: str) -> list[str]:
+    """The addresses at which visitors read this text."""
     return [
         address for address in (*PUBLIC, *more) if name in client.get(address).text.replace("?q=rude", "")
     ]
@@ -69,12 +69,12 @@ def test_renamed_and_masked_names_are_gone_from_board_exports_feed_search_and_th
     sent = published(edition, owner)
     visitor, at = Client(), f"{timezone.now():%Y-%m-%dT%H:%M:%S.%fZ}"
     past = (f"/board/test/?at={at}", f"/board/test.csv?at={at}", f"/methods/{sent.method_id}/")
-    assert len(places(visitor, "Rude Name", *past)) >= 10
-    assert len(places(visitor, "Owls", *past)) >= 8
+    assert len(addresses_with(visitor, "Rude Name", *past)) >= 10
+    assert len(addresses_with(visitor, "Owls", *past)) >= 8
     do(keeper, "rename-method", sent.method_id, name="")
     do(keeper, "rename-team", sent.method.team_id, name="Polite Owls 2")
-    assert places(visitor, "Rude Name", *past) == []
-    assert places(visitor, f"Method {sent.method_id.hex[:6]}", *past) != []
+    assert addresses_with(visitor, "Rude Name", *past) == []
+    assert addresses_with(visitor, f"Method {sent.method_id.hex[:6]}", *past) != []
     assert "Polite Owls 2" in visitor.get("/board/test/").text
     # The audit log has the names beside it, for maintainers.
     page = get(keeper, f"/maintain/audit/?noun_id={sent.method_id}").one("main").text
@@ -166,7 +166,7 @@ def test_a_maintainer_revokes_all_tokens_of_a_person(keeper: Client, owner: User
 
 
 def everything() -> str:
-    """All rows of all tables that could name somebody."""
+    """All rows of all tables that could name a person."""
     tables = [User, Team, Mail, Submission, AuditEvent, AuditText, EmailAddress, Method]
     return "".join(serializers.serialize("json", model._base_manager.all()) for model in tables)
 
@@ -209,9 +209,9 @@ def test_a_team_goes_on_without_its_owner(team: Team, owner: User, teammate: Use
 def test_the_account_page_exports_and_deletes(signed_in: Client, edition: Edition, owner: User) -> None:
     published(edition, owner)
     answer = signed_in.get("/account/data.json")
-    told = answer.json()
-    assert told["account"]["email"] == "owner@example.org"
-    assert [row["method"] for row in told["submissions"]] == ["Rude Name"]
+    document = answer.json()
+    assert document["account"]["email"] == "owner@example.org"
+    assert [row["method"] for row in document["submissions"]] == ["Rude Name"]
     assert "attachment" in answer.headers["Content-Disposition"]
     assert_sound(signed_in.get("/account/data/"))
     wrong = signed_in.post("/account/data/", {"email": "other@example.org"})
@@ -261,13 +261,13 @@ def test_the_export_names_no_method_of_a_team_that_the_person_has_left(
             note="my note",
         )
 
-    def told() -> dict[str, object]:
+    def exported_names() -> dict[str, object]:
         rows = forgetting.export(user=teammate)["submissions"]
         assert {(row["note"], row["filename"]) for row in rows} == {("my note", "predictions.json")}
         return {row["method_id"]: row["method"] for row in rows}
 
     ids = {method.name: str(method.pk) for method in Method.objects.all()}
-    assert told() == {pk: name for name, pk in ids.items()}
+    assert exported_names() == {pk: name for name, pk in ids.items()}
     teams.leave(user=teammate)
     editing.edit(method=Method.objects.get(name="Hers"), changes={"name": "NextGenSecret"}, actor=owner)
-    assert told() == {ids["Hers"]: None, ids["Masked"]: None, ids["Shown"]: "Shown"}
+    assert exported_names() == {ids["Hers"]: None, ids["Masked"]: None, ids["Shown"]: "Shown"}

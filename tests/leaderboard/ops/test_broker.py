@@ -70,30 +70,30 @@ def test_a_broker_that_hangs_is_given_up_and_then_left_alone_for_a_while(listene
 
 
 @pytest.fixture
-def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def sent_messages(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The messages that were sent."""
-    told: list[str] = []
+    sent_messages: list[str] = []
 
     def send(task: str) -> bool:
-        told.append(task)
+        sent_messages.append(task)
         return True
 
     monkeypatch.setattr(broker, "_sent", send)
-    return told
+    return sent_messages
 
 
 @pytest.mark.parametrize("visibility", ["PUBLIC", "PRIVATE"])
 def test_a_file_sent_and_a_file_decided_are_one_message_each(
     edition: Edition,
     owner: User,
-    told: list[str],
+    sent_messages: list[str],
     visibility: str,
     django_capture_on_commit_callbacks: DjangoCaptureOnCommitCallbacks,
 ) -> None:
     with django_capture_on_commit_callbacks(execute=True):
         builders.submit(owner, builders.predictions(edition), visibility=visibility)
-    assert told.count("nudge") == 1
-    told.clear()
+    assert sent_messages.count("nudge") == 1
+    sent_messages.clear()
     with django_capture_on_commit_callbacks(execute=True):
         builders.score_all()
-    assert told == ["work_off"]
+    assert sent_messages == ["work_off"]

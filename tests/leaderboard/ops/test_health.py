@@ -74,7 +74,7 @@ def test_no_sweep_for_a_minute_is_not_ready(seconds_ago: float | None, is_ok: bo
 
 @pytest.mark.django_db(transaction=True)
 @pytest.mark.parametrize(("seconds_ago", "is_ok"), [(20, True), (130, False)])
-def test_events_that_nobody_seals_are_told_and_keep_the_site_ready(seconds_ago: float, is_ok: bool) -> None:
+def test_events_that_nobody_seals_are_shown_and_keep_the_site_ready(seconds_ago: float, is_ok: bool) -> None:
     _swept(seconds_ago=1)
     at = timezone.now() - timedelta(seconds=seconds_ago)
     AuditEvent.objects.create(at=at, verb="opened", noun="Door", noun_id="1")
@@ -86,7 +86,7 @@ def test_events_that_nobody_seals_are_told_and_keep_the_site_ready(seconds_ago: 
 
 
 @pytest.mark.django_db(transaction=True)
-def test_the_balancer_is_told_of_the_database_alone() -> None:  # and nobody has swept
+def test_the_balancer_depends_on_the_database_alone() -> None:  # and nobody has swept
     response = Client().get("/readyz")
     assert (response.status_code, list(response.json()["checks"])) == (200, ["database"])
 

@@ -1,4 +1,4 @@
-"""What is written down: ids in every line about a submission, and nothing that nobody may read."""
+"""Log lines: ids in every line about a submission, and no secrets."""
 
 import io
 import json
@@ -26,7 +26,7 @@ Lines = Callable[[], list[dict[str, Any]]]
 
 @pytest.fixture
 def written() -> Iterator[io.StringIO]:
-    """What goes to standard error in production: every line, ours and the libraries'."""
+    """All lines on standard error in production, ours and the libraries'."""
     stream = io.StringIO()
     handler = logging.StreamHandler(stream)
     handler.setFormatter(logs.formatter(as_json=True))
@@ -56,8 +56,8 @@ def _send(token: str, data: bytes) -> Any:
     )
 
 
-def events(found: list[dict[str, Any]]) -> list[str]:
-    return [line["event"] for line in found]
+def events(records: list[dict[str, Any]]) -> list[str]:
+    return [line["event"] for line in records]
 
 
 def test_every_line_from_upload_to_score_names_the_submission(
@@ -66,16 +66,16 @@ def test_every_line_from_upload_to_score_names_the_submission(
     sent = _send(builders.token(owner), builders.predictions(opened))
     submission_id = sent.json()["id"]
     assert builders.score_all() == 1
-    found = lines()
-    assert events(found) == [
+    records = lines()
+    assert events(records) == [
         "evaluation_queued",
         "submission_received",
         "request_finished",
         "evaluation_finished",
     ]
-    assert {line["request_id"] for line in found[:3]} == {sent.headers["X-Request-ID"]}
-    [evaluation_id] = {line["evaluation_id"] for line in found if "evaluation_id" in line}
-    for line in found:
+    assert {line["request_id"] for line in records[:3]} == {sent.headers["X-Request-ID"]}
+    [evaluation_id] = {line["evaluation_id"] for line in records if "evaluation_id" in line}
+    for line in records:
         if line["event"] != "request_finished":
             assert line["submission_id"] == submission_id
         if line["event"].startswith("evaluation"):

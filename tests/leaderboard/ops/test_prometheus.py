@@ -22,28 +22,28 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 
 
 def figures() -> dict[str, float]:
-    """What the door says now: `name{label="value"}` to number."""
+    """The current metrics: `name{label="value"}` to number."""
     response = Client().get("/metrics")
     assert response.status_code == 200
-    found = {}
+    values = {}
     for family in text_string_to_metric_families(response.text):
         for sample in family.samples:
             labels = ",".join(f'{name}="{value}"' for name, value in sample.labels.items())
-            found[f"{sample.name}{{{labels}}}" if labels else sample.name] = sample.value
-    return found
+            values[f"{sample.name}{{{labels}}}" if labels else sample.name] = sample.value
+    return values
 
 
 def test_queue_is_counted_by_priority_and_aged_by_its_oldest(edition: Edition, owner: User) -> None:
     live = [queue_rows.queued(edition, owner) for _ in range(3)]
     queue_rows.queued(edition, owner, priority=Evaluation.PRIORITY_RESCORE)
     Evaluation.objects.filter(pk=live[1].pk).update(queued_at=F("queued_at") - timedelta(seconds=500))
-    found = figures()
-    assert found['tsttc_queue_depth{priority="live"}'] == 3
-    assert found['tsttc_queue_depth{priority="rescore"}'] == 1
-    assert 500 <= found["tsttc_queue_oldest_age_seconds"] < 560
+    metrics = figures()
+    assert metrics['tsttc_queue_depth{priority="live"}'] == 3
+    assert metrics['tsttc_queue_depth{priority="rescore"}'] == 1
+    assert 500 <= metrics["tsttc_queue_oldest_age_seconds"] < 560
 
 
-def test_runs_are_counted_by_what_came_of_them(edition: Edition, owner: User) -> None:
+def test_runs_are_counted_by_their_outcome(edition: Edition, owner: User) -> None:
     for _ in range(5):
         queue_rows.queued(edition, owner)
     lifecycle.finalise(queue_rows.claim(), queue_rows.SCORED)
@@ -51,14 +51,14 @@ def test_runs_are_counted_by_what_came_of_them(edition: Edition, owner: User) ->
     lifecycle.finalise(queue_rows.claim(), queue_rows.REJECTED)
     lifecycle.fail_attempt(queue_rows.claim(), strike=Strike.INFRASTRUCTURE, reason="disk", rng=RNG)
     queue_rows.claim()
-    found = figures()
-    assert found["tsttc_runs_started_total"] == 5
-    assert found['tsttc_runs_finished_total{outcome="scored"}'] == 2
-    assert found['tsttc_runs_finished_total{outcome="rejected"}'] == 1
-    assert found["tsttc_running"] == 1
-    assert found['tsttc_queue_depth{priority="live"}'] == 1
-    assert found['tsttc_strikes{kind="infrastructure"}'] == 1
-    assert found['tsttc_strikes{kind="poison"}'] == 0
+    metrics = figures()
+    assert metrics["tsttc_runs_started_total"] == 5
+    assert metrics['tsttc_runs_finished_total{outcome="scored"}'] == 2
+    assert metrics['tsttc_runs_finished_total{outcome="rejected"}'] == 1
+    assert metrics["tsttc_running"] == 1
+    assert metrics['tsttc_queue_depth{priority="live"}'] == 1
+    assert metrics['tsttc_strikes{kind="infrastructure"}'] == 1
+    assert metrics['tsttc_strikes{kind="poison"}'] == 0
 
 
 # --- who may read them ----------------------------------------------------------------------------------
@@ -115,7 +115,7 @@ def test_every_figure_is_documented_and_nothing_else(client: Client, db: None) -
 
 
 @pytest.mark.django_db
-def test_answers_are_counted_by_route_and_never_by_what_somebody_typed(client: Client) -> None:
+def test_answers_are_counted_by_route_and_never_by_what_a_visitor_typed(client: Client) -> None:
     def n_of(route: str, status: str) -> float:
         name = f'tsttc_http_requests_total{{method="GET",route="{route}",status="{status}"}} '
         lines = prometheus.exposition().decode().splitlines()

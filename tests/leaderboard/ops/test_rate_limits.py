@@ -1,4 +1,4 @@
-"""Rates: what is let through of one account or address, and what is told of it."""
+"""Rate limits per account or address, and the answers beyond them."""
 
 from datetime import UTC, datetime, timedelta
 
@@ -40,7 +40,7 @@ def rates(settings: Settings) -> None:
 
 
 def taken(*, at_s: float, who: str = "somebody", kind: type[Sent] = Sent) -> Sent | None:
-    """The throttle, if it lets somebody through."""
+    """The throttle, if it lets the request through."""
     throttle = kind()
     throttle.clock_s = NOW_S + at_s
     return throttle if throttle.allow_request(who) else None
@@ -99,7 +99,7 @@ def shared_cache(settings: Settings) -> None:
 
 
 def signing_in(n: int, *, path: str = "/accounts/login/", **headers: str) -> list[int]:
-    """What so many wrong passwords for one account are answered, each from another browser."""
+    """Statuses of n sign-ins with a wrong password for one account, each from another browser."""
     form = {"login": "owner@example.org", "username": "owner@example.org", "password": "wrong"}
     return [Client(**headers).post(path, form).status_code for _ in range(n)]
 
@@ -115,12 +115,12 @@ def test_after_five_wrong_passwords_the_right_one_is_refused_too(shared_cache: N
 def test_a_forwarding_header_does_not_help_the_guesser(
     shared_cache: None, db: None, settings: Settings
 ) -> None:
-    # As many as in earnest, in a time that forty requests take on no machine.
+    # As many as in production, in a window that is longer than forty requests take.
     settings.ACCOUNT_RATE_LIMITS = {**settings.ACCOUNT_RATE_LIMITS, "login": "30/h/ip"}
-    found = []
+    statuses = []
     for n in range(40):
         form = {"login": f"somebody{n}@example.org", "password": "wrong"}
-        found.append(
+        statuses.append(
             Client().post("/accounts/login/", form, headers={"X-Forwarded-For": f"10.0.0.{n}"}).status_code
         )
-    assert found[29:] == [200, *[429] * 10]
+    assert statuses[29:] == [200, *[429] * 10]

@@ -105,7 +105,7 @@ def test_the_maintainers_form_previews_saves_and_brings_back_earlier_texts(
     assert "Somebody changed this page" in assert_sound(stale).one("form", class_="fields").text
 
 
-def test_maintainers_are_told_that_nobody_wrote_the_imprint_and_visitors_are_not(
+def test_maintainers_see_that_nobody_wrote_the_imprint_and_visitors_do_not(
     keeper: Client, benchmark: None, maintainer: User
 ) -> None:
     asked = "names no person and no postal address"

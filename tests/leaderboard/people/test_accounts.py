@@ -1,4 +1,4 @@
-"""Nothing is written any more that belongs to a closed or deleted account, whoever began before it was."""
+"""No request writes rows of a closed or deleted account, even one that began before."""
 
 from collections.abc import Callable
 

@@ -82,7 +82,7 @@ def test_owner_alone_invites_and_not_without_end(
     for other in (teammate, stranger):
         with refused("not-the-owner"):
             invite(team, other)
-    for _ in range(invitations.MAX_STANDING):
+    for _ in range(invitations.MAX_OPEN):
         invite(team, owner)
     with refused("too-many-invitations"):
         invite(team, owner)
@@ -110,10 +110,10 @@ def test_a_team_of_one_comes_along_with_its_methods(
     )
     former = sent.method.team
     secret = invite(team, owner)
-    found = invitations.find(secret=secret, now=timezone.now())
-    told = invitations.meaning(invitation=found, user=stranger)
-    assert (told.left, told.n_methods, told.n_private, told.comes_along) == (former, 2, 1, True)
-    assert told.renamed == (("fοo", "fοo 2"),)
+    invitation = invitations.find(secret=secret, now=timezone.now())
+    meaning = invitations.meaning(invitation=invitation, user=stranger)
+    assert (meaning.left, meaning.n_methods, meaning.n_private, meaning.comes_along) == (former, 2, 1, True)
+    assert meaning.renamed == (("fοo", "fοo 2"),)
     accept(secret, stranger)
     names = sorted(Method.objects.filter(team=team).values_list("name", flat=True))
     assert names == ["Bar", "Foo", "fοo 2"]
@@ -137,7 +137,7 @@ def test_who_is_not_alone_leaves_what_was_sent_behind(
     assert list(team.members.all()) == [owner]
 
 
-def test_owner_of_a_team_with_others_and_a_member_already_are_held_back(
+def test_owner_of_a_team_with_others_and_a_member_already_cannot_join(
     owner: User, teammate: User, stranger: User, team: Team
 ) -> None:
     other = invite(teams.team_of(user=stranger), stranger)
@@ -152,7 +152,7 @@ def test_owner_of_a_team_with_others_and_a_member_already_are_held_back(
 # --- the page ----------------------------------------------------------------------------------------------
 
 
-def test_page_makes_a_link_shows_it_once_and_lets_somebody_in(
+def test_page_makes_a_link_shows_it_once_and_lets_a_user_in(
     client: Client, owner: User, stranger: User, team: Team, caplog: pytest.LogCaptureFixture
 ) -> None:
     client.force_login(owner)

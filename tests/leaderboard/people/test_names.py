@@ -1,4 +1,4 @@
-"""Names: which are told apart, which are taken for one another, and which are none."""
+"""Names: which differ, which are taken for one another, and which are invalid."""
 
 import re
 

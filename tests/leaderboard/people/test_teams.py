@@ -25,7 +25,7 @@ def refused(code: str) -> "pytest.RaisesExc[Refused]":
 # --- the verbs ---------------------------------------------------------------------------------------------
 
 
-def test_somebody_founds_one_team_and_owns_it(owner: User) -> None:
+def test_a_user_founds_one_team_and_owns_it(owner: User) -> None:
     made = teams.create(user=owner, name=" Night  Owls ", now=timezone.now())
     assert (made.name, owners(made)) == ("Night Owls", [owner])
     with refused("in-a-team"):
@@ -137,7 +137,7 @@ def test_a_team_and_a_method_are_renamed_once_a_day(owner: User, team: Team) -> 
     editing.edit(method=method, changes={"description": "Better."}, actor=owner)
 
 
-def test_renaming_changes_every_board_and_is_told_to_the_trail(
+def test_renaming_changes_every_board_and_the_trail_records_it(
     edition: Edition, owner: User, teammate: User, team: Team
 ) -> None:
     builders.submit(owner, builders.predictions(edition))

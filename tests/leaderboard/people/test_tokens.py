@@ -59,7 +59,7 @@ def test_a_token_opens_what_it_was_made_for_and_nothing_else(
         return 401 if is_dead else answer if may else 403
 
     submission = f"/api/v1/submissions/{sent.pk}"
-    found = {
+    statuses = {
         "board": client.get("/api/v1/splits/test/board").status_code,
         "list": client.get("/api/v1/submissions").status_code,
         "one": client.get(submission).status_code,
@@ -67,7 +67,7 @@ def test_a_token_opens_what_it_was_made_for_and_nothing_else(
         "withdraw": client.post(f"{submission}/withdraw").status_code,
         "submit": post(client, builders.predictions(edition, factor=1.3)).status_code,
     }
-    assert found == {
+    assert statuses == {
         "board": wanted(may=may_read and not is_elsewhere, answer=200),
         "list": wanted(may=may_read, answer=200),
         "one": wanted(may=may_read, answer=404 if is_elsewhere else 200),
@@ -75,7 +75,7 @@ def test_a_token_opens_what_it_was_made_for_and_nothing_else(
         "withdraw": wanted(may=may_submit, answer=404 if is_elsewhere else 200),
         "submit": wanted(may=may_submit and not is_elsewhere, answer=201),
     }
-    assert Submission.objects.count() == 1 + (found["submit"] == 201)
+    assert Submission.objects.count() == 1 + (statuses["submit"] == 201)
 
 
 # --- what is said ----------------------------------------------------------------------------------------
@@ -88,7 +88,7 @@ def refusal(client: APIClient, address: str = "/api/v1/submissions") -> tuple[in
 
 
 @pytest.mark.parametrize(
-    ("changed", "status", "code", "said"),
+    ("changed", "status", "code", "sentence"),
     [
         (
             {"expiry": ENDED_AT},
@@ -101,11 +101,11 @@ def refusal(client: APIClient, address: str = "/api/v1/submissions") -> tuple[in
     ],
 )
 def test_a_token_that_does_not_open_says_why(
-    owner: User, secret: str, changed: dict[str, Any], status: int, code: str, said: str
+    owner: User, secret: str, changed: dict[str, Any], status: int, code: str, sentence: str
 ) -> None:
     ApiToken.objects.update(**changed)
-    found = refusal(client_with(secret))
-    assert (found[:2], said in found[2]) == ((status, code), True)
+    answer = refusal(client_with(secret))
+    assert (answer[:2], sentence in answer[2]) == ((status, code), True)
     assert ApiToken.objects.get().last_used_at is None or status == 403
 
 
@@ -116,11 +116,11 @@ def test_a_closed_account_closes_its_tokens(owner: User, secret: str) -> None:
 
 def test_another_split_is_named(edition: Edition, owner: User) -> None:
     client = client_with(builders.token(owner, split_name="val"))
-    said = "The token is valid for the split 'val' only; expected that, found 'test'."
-    assert refusal(client, "/api/v1/splits/test/board") == (403, "token-split", said)
-    assert refusal(client, "/api/v1/compare?split=test&m=x&m=y") == (403, "token-split", said)
+    sentence = "The token is valid for the split 'val' only; expected that, found 'test'."
+    assert refusal(client, "/api/v1/splits/test/board") == (403, "token-split", sentence)
+    assert refusal(client, "/api/v1/compare?split=test&m=x&m=y") == (403, "token-split", sentence)
     response = post(client, builders.predictions(edition))
-    assert (response.status_code, response.json()["detail"]) == (403, said)
+    assert (response.status_code, response.json()["detail"]) == (403, sentence)
 
 
 # --- where it may stand ----------------------------------------------------------------------------------
@@ -149,7 +149,7 @@ def test_the_last_use_is_noted_once_a_minute(owner: User, secret: str) -> None:
 
 
 def test_nobody_piles_up_tokens(owner: User) -> None:
-    for number in range(tokens.MAX_STANDING):
+    for number in range(tokens.MAX_ACTIVE):
         tokens.create(user=owner, name=str(number), now=timezone.now())
     with pytest.raises(Refused, match="50 tokens in use"):
         builders.token(owner)
@@ -175,7 +175,7 @@ def test_making_and_revoking_are_audited_without_the_secret(owner: User, secret:
 # --- a leaked one ----------------------------------------------------------------------------------------
 
 
-def test_whoever_finds_a_token_can_end_it(owner: User, secret: str) -> None:
+def test_anyone_who_finds_a_token_can_end_it(owner: User, secret: str) -> None:
     response = APIClient().post(REVOKE, {"token": f" {secret}\n"}, format="json")
     assert response.status_code == 200
     assert refusal(client_with(secret))[:2] == (401, "token-revoked")
@@ -197,10 +197,10 @@ def test_a_report_without_a_token_says_what_is_expected(db: None, body: object) 
     assert response.json()["problems"][0]["where"] == "token"
 
 
-def test_secret_scanners_are_told_what_a_token_looks_like_and_where_to_end_it() -> None:
-    told = (Path(__file__).resolve().parents[3] / "SECURITY.md").read_text()
-    assert f"    {tokens.PATTERN.pattern}\n" in told
-    assert f"POST {REVOKE}" in told
+def test_secret_scanners_read_what_a_token_looks_like_and_where_to_end_it() -> None:
+    text = (Path(__file__).resolve().parents[3] / "SECURITY.md").read_text()
+    assert f"    {tokens.PATTERN.pattern}\n" in text
+    assert f"POST {REVOKE}" in text
 
 
 # --- one split ---------------------------------------------------------------------------------------------

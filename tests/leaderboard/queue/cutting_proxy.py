@@ -16,7 +16,7 @@ PIECE = 1 << 16
 
 
 class Cut(Enum):
-    """When the connection is cut."""
+    """The moment at which the connection is cut."""
 
     BEFORE_THE_SERVER_HEARS = "before"
     BEFORE_THE_CLIENT_HEARS = "after"
@@ -94,11 +94,11 @@ class CuttingProxy(Proxy):
             while True:
                 ready, _, _ = select.select([client, server], [], [])
                 if client in ready:
-                    said = client.recv(PIECE)
-                    is_cut = bool(said) and server_spoke and self._is_the_one()
-                    if not said or (is_cut and self._cut is Cut.BEFORE_THE_SERVER_HEARS):
+                    message = client.recv(PIECE)
+                    is_cut = bool(message) and server_spoke and self._is_the_one()
+                    if not message or (is_cut and self._cut is Cut.BEFORE_THE_SERVER_HEARS):
                         return
-                    server.sendall(said)
+                    server.sendall(message)
                     server_spoke = False
                     if is_cut:
                         # The answer has come: what was asked is done.

@@ -33,7 +33,7 @@ def all_at_once(*actions: Callable[[], T]) -> list[T]:
 
 
 def verdict(lease: Lease, value: float) -> str:
-    """What a worker hears that finalises with this lease."""
+    """The answer to a worker that finalises with this lease."""
     try:
         is_written = lifecycle.finalise(lease, replace(SCORED, scores={("mid", "overall"): value}))
     except LostRace:

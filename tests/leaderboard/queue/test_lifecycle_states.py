@@ -47,7 +47,7 @@ OUTCOMES = st.sampled_from([SCORED, REJECTED])
 
 @dataclass
 class Expected:
-    """What the model knows of one evaluation."""
+    """The model's state of one evaluation."""
 
     status: Status = Status.QUEUED
     attempt: int = 0
@@ -59,7 +59,7 @@ class Expected:
     strikes: dict[Strike, int] = field(default_factory=lambda: dict.fromkeys(Strike, 0))
 
     def holds(self, lease: Lease) -> bool:
-        """Whether this lease may still decide the evaluation."""
+        """Say if this lease may still decide the evaluation."""
         return self.status == Status.RUNNING and self.lease == lease
 
     def struck(self, strike: Strike, *, is_last: bool = False) -> Status:
@@ -155,19 +155,19 @@ class Life(RuleBasedStateMachine):
     @rule(lease=leases, strike=st.sampled_from(Strike), is_last=st.booleans())
     def give_back(self, lease: Lease, strike: Strike, is_last: bool) -> None:
         expected = self.model[lease.evaluation_id]
-        said: dict[str, Any] = {"strike": strike, "reason": "x", "rng": random.Random(0)}
+        failure: dict[str, Any] = {"strike": strike, "reason": "x", "rng": random.Random(0)}
         if expected.holds(lease):
-            status = lifecycle.fail_attempt(lease, is_last=is_last, **said)
+            status = lifecycle.fail_attempt(lease, is_last=is_last, **failure)
             assert status == expected.struck(strike, is_last=is_last)
         else:
             with pytest.raises(LostRace):
-                lifecycle.fail_attempt(lease, is_last=is_last, **said)
+                lifecycle.fail_attempt(lease, is_last=is_last, **failure)
 
     @rule(some=st.lists(leases, max_size=4, unique_by=lambda lease: lease.evaluation_id))
     def hand_back(self, some: list[Lease]) -> None:
-        held = [lease for lease in some if self.model[lease.evaluation_id].holds(lease)]
-        assert lifecycle.release(some) == len(held)
-        for lease in held:
+        valid = [lease for lease in some if self.model[lease.evaluation_id].holds(lease)]
+        assert lifecycle.release(some) == len(valid)
+        for lease in valid:
             self.model[lease.evaluation_id].status = Status.QUEUED
 
     @rule(lease=leases, overran=st.booleans())

@@ -60,10 +60,10 @@ def test_a_run_that_is_the_last_leaves_a_system_error_until_a_maintainer_retries
 ) -> None:
     evaluation = queue_rows.queued(edition, owner)
     lease = queue_rows.claim()
-    said = {"reason": "reading the file took more than 4 s of processor time", "rng": random.Random(0)}
-    assert lifecycle.fail_attempt(lease, strike=Strike.POISON, is_last=True, **said) == Status.SYSTEM_ERROR
+    failure = {"reason": "reading the file took more than 4 s of processor time", "rng": random.Random(0)}
+    assert lifecycle.fail_attempt(lease, strike=Strike.POISON, is_last=True, **failure) == Status.SYSTEM_ERROR
     row = queue_rows.row(lease)
-    assert (row.attempt, row.n_poison_strikes, row.last_error) == (1, 1, said["reason"])
+    assert (row.attempt, row.n_poison_strikes, row.last_error) == (1, 1, failure["reason"])
     assert row.is_file_suspect
     assert AuditEvent.objects.filter(verb="system_error", noun_id=row.pk).count() == 1
     lifecycle.retry(evaluation=evaluation, actor=maintainer)
@@ -81,7 +81,7 @@ def test_expired_lease_is_taken_back_once_as_an_infrastructure_strike(lease: Lea
     assert row.last_error == "the worker stopped answering"
 
 
-def test_a_run_that_held_on_until_its_deadline_is_poison(lease: Lease) -> None:
+def test_a_run_that_lasts_until_its_deadline_is_poison(lease: Lease) -> None:
     queue_rows.expire(lease, overran=True)
     assert queue_rows.release_expired() == 1
     row = queue_rows.row(lease)

@@ -1,4 +1,4 @@
-"""A file whose values look shuffled is scored, and its team is told; hidden values have no part in it."""
+"""A file whose values look shuffled is scored, and its team is warned; hidden values play no part in it."""
 
 from datetime import timedelta
 from pathlib import Path

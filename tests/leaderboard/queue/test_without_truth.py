@@ -60,7 +60,7 @@ def test_a_worker_with_another_ground_truth_does_what_it_can(
 
 
 @pytest.mark.django_db(transaction=True)
-def test_the_sweep_says_so_in_the_log_and_healthy_to_whoever_watches(
+def test_the_sweep_says_so_in_the_log_and_healthy_to_monitors(
     waiting: Submission, settings: Settings, caplog: pytest.LogCaptureFixture
 ) -> None:
     aside = take_away(settings)

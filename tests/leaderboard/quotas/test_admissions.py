@@ -31,7 +31,7 @@ def admit(team: Team, maintainer: User) -> Admission:
     return admissions.admit(team=team, split=split, reason="R", actor=maintainer, now=timezone.now())
 
 
-def test_a_team_that_is_not_admitted_is_told_so_everywhere_in_the_same_words(
+def test_a_team_that_is_not_admitted_reads_so_everywhere_in_the_same_words(
     client: Client, by_admission: Edition, owner: User
 ) -> None:
     client.force_login(owner)

@@ -72,13 +72,13 @@ def test_kept_answers_hear_of_a_time_that_has_come(edition: Edition, client: Cli
     before = board_versions.sum_of_all()
     assert "open at" in client.get("/board/test/").text
     # It has opened; then it has closed; then a maintainer gives more time.
-    for shift, said in ((-HOUR / 2, "close at"), (-3 * HOUR, "closed at"), (-HOUR / 2, "close at")):
+    for shift, phrase in ((-HOUR / 2, "close at"), (-3 * HOUR, "closed at"), (-HOUR / 2, "close at")):
         moment = timezone.now() + shift
         Split.objects.filter(pk="test").update(opens_at=moment, closes_at=moment + HOUR)
         pollers.sweep(rng=random.Random(0))
         assert board_versions.sum_of_all() > before
         before = board_versions.sum_of_all()
-        assert said in client.get("/board/test/").text
+        assert phrase in client.get("/board/test/").text
         assert board_versions.bump_passed_deadlines(now=timezone.now()) == 0
     assert BoardVersion.objects.get(split="test").n_times_passed == 1
 

@@ -1,4 +1,4 @@
-"""What files cost beside slots: a day's bytes, and those that stop the process that reads them."""
+"""Limits on files besides slots: bytes per day, and files that stop the process that reads them."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a mailbox has sent stays sent when its account is deleted, and is forgotten with the last window."""
+"""Submissions of a mailbox count after its account is deleted, until the last window ends."""
 
 from datetime import timedelta
 
@@ -58,7 +58,7 @@ def left(user: User) -> int | None:
 # --- the attack ---------------------------------------------------------------------------------------------
 
 
-def test_whoever_sends_deletes_and_signs_up_again_has_no_other_quota(limited: Edition) -> None:
+def test_a_user_who_sends_deletes_and_signs_up_again_has_no_other_quota(limited: Edition) -> None:
     send(limited, account("x@example.org"), 1.1, 1.2, 1.3)
     for email in ("x@example.org", "X@Example.org", "x+1@example.org"):
         forget(User.objects.get(is_active=True))

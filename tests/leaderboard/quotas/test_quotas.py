@@ -64,11 +64,11 @@ def test_the_three_splits_have_their_quotas_from_the_start(db: None) -> None:
     PublishedResult.objects.all().delete()
     Split.objects.all().delete()
     splits.ensure_splits()
-    found = {
+    rules_by_split = {
         split.pk: (split.quota_limit, split.quota_window, split.quota_min_gap, split.quota_rejected_limit)
         for split in Split.objects.all()
     }
-    assert found == {
+    assert rules_by_split == {
         "test": (3, 30 * DAY, DAY, 20),
         "val": (50, DAY, timedelta(0), 20),
         "demo": (20, DAY, timedelta(0), 20),
@@ -163,7 +163,7 @@ def test_an_edition_that_is_given_up_costs_its_submissions_nothing(edition: Edit
     assert (state(owner).used, state(owner).n_rejected) == (1, 0)
 
 
-def test_scoring_anew_costs_nothing_and_gives_nothing_back(
+def test_scoring_again_costs_nothing_and_gives_nothing_back(
     edition: Edition, owner: User, tmp_path: Path
 ) -> None:
     limit(limit=2)
@@ -225,8 +225,8 @@ def test_a_team_can_have_rules_of_its_own_with_a_reason(
     row = builders.override(teams.team_of(user=owner), limit=2, reason=reason, actor=maintainer)
     assert (state(owner).left, state(stranger).left) == (1, 0)
     event = AuditEvent.objects.get(verb="quota_overridden", actor=maintainer)
-    told = {name: event.details[name] for name in ("split", "quota_limit", "reason")}
-    assert told == {"split": "test", "quota_limit": 2, "reason": reason}
+    details = {name: event.details[name] for name in ("split", "quota_limit", "reason")}
+    assert details == {"split": "test", "quota_limit": 2, "reason": reason}
     limits.end_override(row=row, actor=maintainer)
     assert state(owner).left == 0
     assert AuditEvent.objects.filter(verb="quota_restored", noun_id=row.team_id).count() == 1
@@ -246,7 +246,7 @@ rules = st.builds(
 
 
 @given(rules=rules, spent=st.lists(minutes, max_size=8), rejected=st.lists(minutes, max_size=8), now=minutes)
-def test_the_next_slot_opens_exactly_when_it_is_said_to(
+def test_the_next_slot_opens_exactly_when_the_quota_says(
     rules: QuotaOverride, spent: list[datetime], rejected: list[datetime], now: datetime
 ) -> None:
     split = Split(name="test")
@@ -254,12 +254,12 @@ def test_the_next_slot_opens_exactly_when_it_is_said_to(
     def weighed(at: datetime) -> Quota:
         return limits.weigh(split=split, rules=rules, spent=sorted(spent), rejected=sorted(rejected), now=at)
 
-    found = weighed(now)
-    if found.is_open:
-        assert found.next_slot_at is None
-        assert found.limit is None or found.left
+    quota = weighed(now)
+    if quota.is_open:
+        assert quota.next_slot_at is None
+        assert quota.limit is None or quota.left
         return
-    assert found.next_slot_at is not None
-    assert weighed(found.next_slot_at).is_open
-    assert not weighed(found.next_slot_at - timedelta(microseconds=1)).is_open
-    assert found.retry_after_s(now=now) == (found.next_slot_at - now).total_seconds()
+    assert quota.next_slot_at is not None
+    assert weighed(quota.next_slot_at).is_open
+    assert not weighed(quota.next_slot_at - timedelta(microseconds=1)).is_open
+    assert quota.retry_after_s(now=now) == (quota.next_slot_at - now).total_seconds()

@@ -36,9 +36,9 @@ def test_model_verb_and_database_refuse_it_as_well(
 ) -> None:
     split = Split.objects.get(pk="test")
     setattr(split, field, value)
-    with pytest.raises(ValidationError) as found:
+    with pytest.raises(ValidationError) as invalid:
         split.full_clean()
-    assert sentence in found.value.message_dict[field][0]
+    assert sentence in invalid.value.message_dict[field][0]
     with pytest.raises(IntegrityError), transaction.atomic():
         Split.objects.filter(pk="test").update(**{field: value})
     given = RULES | {field.removeprefix("quota_"): value}

@@ -16,12 +16,12 @@ FORK_SERVER = "evaluator.predictions.reader_server"
 
 
 def children() -> set[int]:
-    """Readers of untrusted files that this process has started, or had forked, and not yet buried.
+    """Ids of the readers of untrusted files that this process or its fork servers started and did not reap.
 
     Other tests of the same run have children as well, such as the driver of a browser.
     """
-    found = children_of("self")
-    readers = {pid for pid in found if any(module in kernel_says(pid, "cmdline") for module in READERS)}
+    pids = children_of("self")
+    readers = {pid for pid in pids if any(module in kernel_says(pid, "cmdline") for module in READERS)}
     return readers.union(*map(children_of, fork_servers()))
 
 
@@ -31,13 +31,13 @@ def fork_servers() -> set[int]:
 
 
 def children_of(process: int | str) -> set[int]:
-    """What all threads of a process have started."""
-    found: set[int] = set()
+    """Ids of the processes that all threads of a process have started."""
+    pids: set[int] = set()
     with suppress(FileNotFoundError):
         for task in Path(f"/proc/{process}/task").iterdir():
             # A thread that has ended meanwhile has no children.
-            found |= {int(pid) for pid in kernel_says(process, f"task/{task.name}/children").split()}
-    return found
+            pids |= {int(pid) for pid in kernel_says(process, f"task/{task.name}/children").split()}
+    return pids
 
 
 def kernel_says(pid: int | str, name: str) -> str:
@@ -53,11 +53,11 @@ def limits(pid: int) -> dict[str, list[str]]:
 
 
 def is_reading(pid: int) -> bool:
-    """Whether the child has given up all it gives up, and reads its file."""
+    """Say if the child has dropped its rights and reads its file."""
     return limits(pid).get("Max open files") == ["0", "0"]
 
 
 def ignores(pid: int, number: signal.Signals) -> bool:
-    """Whether the process has said that it will not hear this signal."""
+    """Say if the process ignores this signal."""
     masks = [line.partition(":")[2] for line in kernel_says(pid, "status").splitlines() if "SigIgn:" in line]
     return any(int(mask, 16) & 1 << (number - 1) for mask in masks)

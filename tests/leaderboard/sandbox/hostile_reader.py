@@ -48,7 +48,7 @@ WITHOUT_A_FILTER = "system_calls.why_unavailable = lambda: 'none here'"
 
 
 def write_site(directory: Path, *, more: str = "") -> None:
-    """What a Python that has this directory on its path runs first."""
+    """Write the module that a Python with this directory on its path runs first."""
     site = _SITE.format(repository=str(REPOSITORY), mark=MARK, more=more)
     (directory / "sitecustomize.py").write_text(site)
 
@@ -95,31 +95,31 @@ def fork():
     os.waitpid(pid, 0)
 
 attempts = {
-    "open the labels": lambda: os.open(places["labels"], os.O_RDONLY),
-    "open the secret": lambda: os.open(places["secret"], os.O_RDONLY),
+    "open the labels": lambda: os.open(targets["labels"], os.O_RDONLY),
+    "open the secret": lambda: os.open(targets["secret"], os.O_RDONLY),
     "open the worker's environment": lambda: os.open(f"/proc/{worker}/environ", os.O_RDONLY),
     "open the worker's memory": lambda: os.open(f"/proc/{worker}/mem", os.O_RDONLY),
     "open its own maps": lambda: os.open("/proc/self/maps", os.O_RDONLY),
-    "write a new file": lambda: os.open(places["new"], os.O_WRONLY | os.O_CREAT),
-    "list the labels": lambda: os.listdir(places["directory"]),
+    "write a new file": lambda: os.open(targets["new"], os.O_WRONLY | os.O_CREAT),
+    "list the labels": lambda: os.listdir(targets["directory"]),
     "list the processes": lambda: os.listdir("/proc"),
-    "connect to the database": lambda: connect(socket.AF_INET, ("127.0.0.1", places["port"])),
+    "connect to the database": lambda: connect(socket.AF_INET, ("127.0.0.1", targets["port"])),
     "ask the network": lambda: socket.socket(socket.AF_INET, socket.SOCK_DGRAM),
     "duplicate a descriptor": lambda: os.dup(1),
     "make a pipe": os.pipe,
     "make a file in memory": lambda: os.memfd_create("x"),
-    "close one and open": lambda: room_for_one(places["labels"]),
+    "close one and open": lambda: room_for_one(targets["labels"]),
     "take more memory": lambda: mmap.mmap(-1, 1 << 36),
-    "read the size of a file": lambda: os.stat(places["labels"]),
-    "look into the worker": lambda: look_into(worker, places["address"]),
+    "read the size of a file": lambda: os.stat(targets["labels"]),
+    "look into the worker": lambda: look_into(worker, targets["address"]),
     "trace the worker": lambda: called("ptrace", 0x4206, worker, 0, 0),
     "signal the worker": lambda: os.kill(worker, 0),
     "signal the server": lambda: os.kill(os.getppid(), 0),
     "limit the worker": lambda: resource.prlimit(worker, resource.RLIMIT_NPROC),
     "raise its own limits": lambda: called("setrlimit", 7, (ctypes.c_ulong * 2)(64, 64)),
     "let others read it": lambda: called("prctl", 4, 1, 0, 0, 0),
-    "unlink a stored file": lambda: os.unlink(places["stored"]),
-    "make a directory": lambda: os.mkdir(places["new"]),
+    "unlink a stored file": lambda: os.unlink(targets["stored"]),
+    "make a directory": lambda: os.mkdir(targets["new"]),
     "start a process": fork,
     "execute a program": lambda: os.execv("/", ["a directory"]),
 }
@@ -136,9 +136,9 @@ raise Rejected([Problem("not-json", table[name], name) for name in names])
 """
 
 
-def attempts(*, worker: int, places: dict[str, str | int]) -> bytes:
-    """A file that tries all of it, and lists in its rejection what came of each."""
-    return MARK + f"worker = {worker}\nplaces = {places!r}\n{ATTEMPTS}".encode()
+def attempts(*, worker: int, targets: dict[str, str | int]) -> bytes:
+    """A file that tries all of it, and lists the outcome of each attempt in its rejection."""
+    return MARK + f"worker = {worker}\ntargets = {targets!r}\n{ATTEMPTS}".encode()
 
 
 def says(words: bytes) -> bytes:

@@ -69,8 +69,8 @@ def read(tmp_path: Path, manifest: Manifest) -> Read:
 
 
 @pytest.fixture
-def places(tmp_path: Path) -> dict[str, str | int]:
-    """What there is to be had: a truth, a secret, a file of the store."""
+def targets(tmp_path: Path) -> dict[str, str | int]:
+    """Targets of the attempts: a truth, a secret, a file of the store."""
     private = tmp_path / "private"
     private.mkdir()
     for name in ("labels", "secret", "stored"):
@@ -79,34 +79,34 @@ def places(tmp_path: Path) -> dict[str, str | int]:
     return named | {"new": str(private / "new"), "directory": str(private)}
 
 
-def table_of(read: Read, places: dict[str, str | int]) -> dict[str, str]:
-    """What came of each attempt of a reader that was taken over."""
+def table_of(read: Read, targets: dict[str, str | int]) -> dict[str, str]:
+    """The outcome of each attempt of a reader that was taken over."""
     secret = ctypes.create_string_buffer(b"in memory")
     with socket.create_server(("127.0.0.1", 0)) as database:
-        place = {"port": database.getsockname()[1], "address": ctypes.addressof(secret)}
-        data = attempts(worker=os.getpid(), places=places | place)
-        with pytest.raises(Rejected) as told:
+        numbers = {"port": database.getsockname()[1], "address": ctypes.addressof(secret)}
+        data = attempts(worker=os.getpid(), targets=targets | numbers)
+        with pytest.raises(Rejected) as refusal:
             read(data)
-    return {problem.where: problem.message for problem in told.value.problems}
+    return {problem.where: problem.message for problem in refusal.value.problems}
 
 
 @needs_a_filter
 def test_reader_that_is_taken_over_reaches_nothing(
-    read: Read, places: dict[str, str | int], settings: Settings, tmp_path: Path
+    read: Read, targets: dict[str, str | int], settings: Settings, tmp_path: Path
 ) -> None:
     with obeying_its_file(tmp_path, settings):
-        table = table_of(read, places)
+        table = table_of(read, targets)
     assert len(table) == 27
     assert table.pop("take more memory") == "ENOMEM"
     assert set(table.values()) == {"EPERM"}, table
-    assert Path(str(places["stored"])).exists()
+    assert Path(str(targets["stored"])).exists()
 
 
 def test_without_a_filter_it_still_opens_nothing(
-    read: Read, places: dict[str, str | int], settings: Settings, tmp_path: Path
+    read: Read, targets: dict[str, str | int], settings: Settings, tmp_path: Path
 ) -> None:
     with obeying_its_file(tmp_path, settings, more=WITHOUT_A_FILTER):
-        table = table_of(read, places)
+        table = table_of(read, targets)
     opening = list(table)[: list(table).index("take more memory")]
     assert len(opening) == 14
     assert "reached" not in {table[name] for name in opening}, table
@@ -150,7 +150,7 @@ def rejected(n_problems: object = 1, problems: object = None, **changes: object)
 TRUTHFUL = (
     MARK
     + b"""
-digest = predictions.sha256_digest(data)
+digest = loading.sha256_digest(data)
 line = json.dumps({"verdict": "good", "digest": digest, "unit": "ttc", "keys": "anno_id", "enveloped": False})
 values = [5.0] * manifest.n_sequences
 CHANGE
@@ -173,9 +173,9 @@ def test_an_answer_as_an_honest_reader_gives_it_is_taken(
     monkeypatch.setattr(child.fork_server, "AVAILABLE", is_forked)
     with obeying_its_file(tmp_path, settings):
         data = changed("values[1] = float('-inf')")
-        found = read(data)
-    assert found.digest == sha256_digest(data)
-    assert found.ttc_s[:3].tolist() == [5.0, -np.inf, 5.0]
+        predictions = read(data)
+    assert predictions.digest == sha256_digest(data)
+    assert predictions.ttc_s[:3].tolist() == [5.0, -np.inf, 5.0]
 
 
 LIES = {
@@ -274,12 +274,12 @@ def read_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[by
 
 @needs_a_filter
 def test_reader_of_annotations_that_is_taken_over_reaches_nothing(
-    read_folder: Callable[[bytes], Manifest], places: dict[str, str | int]
+    read_folder: Callable[[bytes], Manifest], targets: dict[str, str | int]
 ) -> None:
-    place = {"port": 5432, "address": 4096}
-    with pytest.raises(Rejected) as told:
-        read_folder(attempts(worker=os.getpid(), places=places | place))
-    table = {problem.where: problem.message for problem in told.value.problems}
+    numbers = {"port": 5432, "address": 4096}
+    with pytest.raises(Rejected) as refusal:
+        read_folder(attempts(worker=os.getpid(), targets=targets | numbers))
+    table = {problem.where: problem.message for problem in refusal.value.problems}
     assert len(table) == 27
     # Its own limits it may lower, file by file; not raise, but for root.
     assert table.pop("raise its own limits") in {"EPERM", "reached"}

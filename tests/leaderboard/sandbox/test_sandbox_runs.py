@@ -31,7 +31,7 @@ pytestmark = pytest.mark.slow
 
 
 def run_next() -> bool:
-    """What is due now, whatever its backoff."""
+    """The evaluation that is due now, whatever its backoff."""
     queue_rows.make_due()
     return worker.run_next(rng=random.Random(0))
 
@@ -94,7 +94,7 @@ def test_file_that_takes_too_much_processor_time_is_read_once_and_its_team_reads
     )
 
 
-def test_run_that_takes_too_long_is_ended_and_held_against_the_file(
+def test_run_that_takes_too_long_is_ended_and_counts_against_the_file(
     edition: Edition, owner: User, settings: Settings
 ) -> None:
     settings.WALL_S, settings.LEASE_S, settings.HEARTBEAT_S = 0.3, 0.1, 0.02
@@ -114,7 +114,7 @@ def test_file_that_the_store_has_lost_is_not_blamed(edition: Edition, owner: Use
     assert "FileNotFoundError" in evaluation_of(submission).last_error
 
 
-def test_damaged_ground_truth_is_not_held_against_the_file(edition: Edition, owner: User) -> None:
+def test_damaged_ground_truth_does_not_count_against_the_file(edition: Edition, owner: User) -> None:
     submission = builders.submit(owner, builders.predictions(edition))
     truth_values.load.cache_clear()
     truth_values.values_path(edition.ground_truth_id).write_bytes(b"no archive")
@@ -126,7 +126,7 @@ def test_damaged_ground_truth_is_not_held_against_the_file(edition: Edition, own
     assert "cannot be used" in evaluation_of(submission).last_error
 
 
-def test_reader_that_cannot_start_is_not_held_against_the_file(edition: Edition, owner: User) -> None:
+def test_reader_that_cannot_start_does_not_count_against_the_file(edition: Edition, owner: User) -> None:
     submission = builders.submit(owner, builders.predictions(edition))
     truth_values.manifest_path(edition.ground_truth_id).unlink()
     assert run_next()

@@ -1,4 +1,4 @@
-"""What workers wrote beside the scores."""
+"""Intervals and rank ranges that workers wrote with the scores."""
 
 from dataclasses import asdict, dataclass
 
@@ -21,10 +21,10 @@ def scores_of(submission: Submission, edition: Edition) -> dict[str, Inferred]:
     evaluation = Evaluation.objects.get(submission=submission, edition=edition)
     intervals = scored_in(edition, ranges=ranges_in(edition))[evaluation.pk].intervals
     return {
-        name: Inferred(**asdict(found), pk=row.pk, value=row.value)
+        name: Inferred(**asdict(interval), pk=row.pk, value=row.value)
         for row in Score.objects.filter(evaluation=evaluation)
         for name in [score_name(row.metric, row.ttc_range)]
-        for found in [intervals.get(name, ConfidenceInterval())]
+        for interval in [intervals.get(name, ConfidenceInterval())]
     }
 
 

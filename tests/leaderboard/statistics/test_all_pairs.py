@@ -25,8 +25,8 @@ A, B, C = (
 
 def with_range(entry: Entry, low: int, high: int) -> Entry:
     """The entry with a rank range on the board, and its mark."""
-    found = ConfidenceInterval(rank_low=low, rank_high=high)
-    return replace(entry, intervals={"mid": found})
+    interval = ConfidenceInterval(rank_low=low, rank_high=high)
+    return replace(entry, intervals={"mid": interval})
 
 
 def compared(
@@ -45,7 +45,7 @@ def compared(
 
 
 @pytest.mark.parametrize(
-    ("p_of_b", "p_of_c", "said"),
+    ("p_of_b", "p_of_c", "ending"),
     [
         (0.001, 0.001, "it is significantly better than B and C."),
         (0.4, 0.4, "it is not significantly better than B and C."),
@@ -53,13 +53,13 @@ def compared(
     ],
 )
 def test_the_best_of_three_is_named_with_those_that_it_is_significantly_better_than(
-    p_of_b: float, p_of_c: float, said: str
+    p_of_b: float, p_of_c: float, ending: str
 ) -> None:
     sentence = compare_tables.verdict(compared(p_of_b, p_of_c, 0.5))
     head = (
         "Of these three, A has the lowest MiD, 10.00. On these recordings, with all 3 pairs tested together"
     )
-    assert sentence == f"{head}, {said}"
+    assert sentence == f"{head}, {ending}"
 
 
 def test_a_p_that_is_small_among_three_by_chance_names_no_winner() -> None:
@@ -81,7 +81,7 @@ def test_no_method_is_called_worse_that_the_board_marks_as_possibly_best() -> No
     assert sentence.endswith("it is significantly better than C, and not significantly better than B.")
 
 
-def test_what_the_board_tells_apart_by_rank_ranges_is_told_apart() -> None:
+def test_methods_with_separate_rank_ranges_on_the_board_are_separate() -> None:
     """The ranges of a board hold all at once: A is before B and C wherever their true ranks lie in them."""
     entries = with_range(A, 1, 1), with_range(B, 2, 3), with_range(C, 2, 3)
     sentence = compare_tables.verdict(compared(0.04, 0.04, 0.5, entries=entries))
@@ -103,7 +103,7 @@ def test_among_equal_methods_a_winner_is_rarely_named_and_never_against_the_boar
     both = list(itertools.combinations(range(n_methods), 2))
     p = np.array([sign_flips(sums[i] - sums[j], counts, rng=rng, n_flips=1_999).p for i, j in both])
     on_board = rank_ranges(sums, published=means, usable=np.ones(n, dtype=np.bool_), rng=rng)
-    said = []
+    sentences = []
     for page in range(n):
         entries = [
             with_range(
@@ -113,18 +113,18 @@ def test_among_equal_methods_a_winner_is_rarely_named_and_never_against_the_boar
             )
             for i in range(n_methods)
         ]
-        told = p[:, page].tolist()
-        said += [
+        p_values = p[:, page].tolist()
+        sentences += [
             compare_tables.verdict(
-                compared(*[None] * len(both), entries=entries, below=[p_below(each) for each in told])
+                compared(*[None] * len(both), entries=entries, below=[p_below(each) for each in p_values])
                 if is_hidden
-                else compared(*told, entries=entries)
+                else compared(*p_values, entries=entries)
             )
         ]
-        worse = said[-1].partition("it is significantly better than ")[2].partition(", and not")[0]
+        worse = sentences[-1].partition("it is significantly better than ")[2].partition(", and not")[0]
         named = [entry for entry in entries if entry.method in worse]
         assert not any(entry.intervals["mid"].is_with_best for entry in named)
-    share = sum("it is significantly better than" in each for each in said) / n
+    share = sum("it is significantly better than" in each for each in sentences) / n
     assert share <= 0.05 + margin(0.05, n)
 
 

@@ -62,8 +62,8 @@ def test_a_comparison_is_asked_for_once_and_answered_by_a_worker(
     }
     for pair in answer.pairs:
         assert list(pair.differences) == list(SCORE_NAMES)
-        for name, found in known(pair).items():
-            assert found.difference == rounded(pair.first.scores[name] - pair.second.scores[name], decimals=1)
+        for name, delta in known(pair).items():
+            assert delta.difference == rounded(pair.first.scores[name] - pair.second.scores[name], decimals=1)
         overall = known(pair)["mid"]
         assert overall.low <= overall.difference <= overall.high < 0
         assert overall.is_significant
@@ -83,8 +83,8 @@ def test_the_worker_computes_what_the_evaluator_says_offline(
         with files.opened_predictions(sent.digest) as kept:
             read.append(read_predictions(kept.read(), manifest=truth.manifest))
     offline = compare_predictions(read[0], read[1], truth, decimals=1)
-    for name, found in known(pair).items():
-        assert found == offline[name], name
+    for name, difference in known(pair).items():
+        assert difference == offline[name], name
 
 
 def test_the_same_pair_the_other_way_round_is_the_same_comparison(entries: list[Submission]) -> None:
@@ -92,13 +92,13 @@ def test_the_same_pair_the_other_way_round_is_the_same_comparison(entries: list[
     builders.infer_all()
     (pair,), (turned,) = ask(*entries[:2]).pairs, ask(*entries[1::-1]).pairs
     assert Comparison.objects.count() == 1
-    for name, found in known(pair).items():
+    for name, difference in known(pair).items():
         other = known(turned)[name]
-        assert other.difference == -found.difference
+        assert other.difference == -difference.difference
         assert (other.low, other.high, other.p) == (
-            None if found.high is None else -found.high,
-            None if found.low is None else -found.low,
-            found.p,
+            None if difference.high is None else -difference.high,
+            None if difference.low is None else -difference.low,
+            difference.p,
         )
 
 
@@ -114,7 +114,7 @@ def test_a_method_is_compared_as_it_stands_now(
     assert known(ask(*entries[:2]).pairs[0])["mid"].difference > 0
 
 
-def test_unknown_and_invisible_methods_are_told_apart_by_nobody(
+def test_unknown_and_invisible_methods_look_alike_to_everybody(
     entries: list[Submission], owner: User, stranger: User
 ) -> None:
     set_visibility(entries[0], Visibility.PRIVATE)
@@ -173,13 +173,13 @@ def test_too_few_recordings_give_differences_without_p(benchmark: None, owner: U
     builders.infer_all()
     answer = ask(*sent)
     assert "too few recordings (effective number 6.9; at least 8 needed)" in answer.reason
-    found = known(answer.pairs[0])["mid"]
-    assert (found.low, found.high, found.p, found.is_significant) == (None, None, None, False)
+    overall = known(answer.pairs[0])["mid"]
+    assert (overall.low, overall.high, overall.p, overall.is_significant) == (None, None, None, False)
     assert answer.pairs[0].sentence().endswith("at least 8 needed) to say whether that is significant.")
 
 
 @pytest.mark.parametrize("factor", [1.05, 1.05 + 1e-7], ids=["the same file", "a file published alike"])
-def test_what_is_published_alike_is_not_told_apart(
+def test_values_published_alike_are_not_significantly_different(
     entries: list[Submission], edition: Edition, stranger: User, factor: float
 ) -> None:
     other = builders.submit(stranger, builders.predictions(edition, factor=factor), method="Other")
@@ -189,8 +189,8 @@ def test_what_is_published_alike_is_not_told_apart(
     builders.infer_all()
     (pair,) = ask(entries[0], other).pairs
     assert known(pair)["mid"].p == 1.0
-    for found in known(pair).values():
-        if found.p is not None:
-            assert (found.difference, found.p, found.p_below) == (0.0, 1.0, 1.0)
-            assert found.low <= 0 <= found.high
+    for difference in known(pair).values():
+        if difference.p is not None:
+            assert (difference.difference, difference.p, difference.p_below) == (0.0, 1.0, 1.0)
+            assert difference.low <= 0 <= difference.high
     assert pair.sentence() == "M1.05 and Other have the same MiD to one decimal."

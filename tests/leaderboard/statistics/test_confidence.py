@@ -1,8 +1,8 @@
-"""Intervals and rank ranges on the server: what is written beside the scores, when, and for whom."""
+"""Intervals and rank ranges on the server: what is written with the scores, when, and for whom."""
 
 import random
 from collections.abc import Collection
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from leaderboard.boards import listing
 from leaderboard.models import (
     BoardVersion,
     Edition,
+    EditionRanges,
     Evaluation,
     Method,
     PublishedResult,
@@ -41,8 +42,8 @@ def hide(submission: Submission) -> None:
     Method.objects.filter(pk=submission.method_id).update(visibility=Visibility.PRIVATE)
 
 
-def stale(*, now: datetime, held: Collection[str]) -> list[Edition]:
-    return [entries.edition for entries in confidence.stale(now=now, held=held)]
+def stale(*, now: datetime, readable_truths: Collection[str]) -> list[Edition]:
+    return [entries.edition for entries in confidence.stale(now=now, readable_truths=readable_truths)]
 
 
 def version() -> int:
@@ -90,11 +91,11 @@ def test_every_value_gets_an_interval_and_a_rank_range_that_hold_what_is_publish
         assert interval.is_with_best == (interval.rank_low == 1)
     assert all(not entry.intervals for entry in entries if entry.kind == "published")
     for submission in inferred[:2]:
-        found = scores_of(submission, edition)["mid"]
+        score = scores_of(submission, edition)["mid"]
         low, high = plain_interval(submission, edition)
         step = disclosure.step_of(high - low, decimals=1)
-        assert low - step - 0.006 <= found.low <= low + 0.006
-        assert high - 0.006 <= found.high <= high + step + 0.006
+        assert low - step - 0.006 <= score.low <= low + 0.006
+        assert high - 0.006 <= score.high <= high + step + 0.006
 
 
 def test_a_column_in_too_few_recordings_has_no_interval_while_others_have(
@@ -193,15 +194,15 @@ def test_a_range_that_does_not_hold_the_rank_any_more_is_left_out(
     intake.withdraw(submission=best, actor=owner, now=timezone.now())
     rows = {row.submission_id: row for row in board_now().entries}
     gone = [rows[other.pk].intervals["mid"] for other in others]
-    assert None in [found.rank_low for found in gone]
-    for other, found in zip(others, gone, strict=True):
-        assert found.rank_low is None or found.rank_low <= rows[other.pk].rank <= found.rank_high
-    assert all(found.low is not None for found in gone)
+    assert None in [interval.rank_low for interval in gone]
+    for other, interval in zip(others, gone, strict=True):
+        assert interval.rank_low is None or interval.rank_low <= rows[other.pk].rank <= interval.rank_high
+    assert all(interval.low is not None for interval in gone)
     builders.infer_all()
     rows = {row.submission_id: row for row in board_now().entries}
     for other in others:
-        found, rank = rows[other.pk].intervals["mid"], rows[other.pk].rank
-        assert found.rank_low <= rank <= found.rank_high
+        interval, rank = rows[other.pk].intervals["mid"], rows[other.pk].rank
+        assert interval.rank_low <= rank <= interval.rank_high
 
 
 def test_a_board_as_of_a_time_has_intervals_and_no_ranges_of_today(
@@ -211,12 +212,12 @@ def test_a_board_as_of_a_time_has_intervals_and_no_ranges_of_today(
     rows = [entry for entry in then.entries if entry.kind == "submission"]
     assert len(rows) == len(inferred)
     for entry in rows:
-        found = entry.intervals["mid"]
-        assert None not in (found.low, found.high)
-        assert (found.rank_low, found.rank_high, found.is_with_best) == (None, None, None)
+        interval = entry.intervals["mid"]
+        assert None not in (interval.low, interval.high)
+        assert (interval.rank_low, interval.rank_high, interval.is_with_best) == (None, None, None)
 
 
-def test_sums_that_are_gone_are_made_anew_from_values_and_from_the_file(
+def test_sums_that_are_gone_are_made_again_from_values_and_from_the_file(
     inferred: list[Submission], edition: Edition
 ) -> None:
     digest, file = inferred[0].digest, inferred[0].sent_file
@@ -255,7 +256,7 @@ def test_live_submissions_are_decided_before_the_work_behind_them_goes_on(
     entries: list[Submission], edition: Edition, stranger: User
 ) -> None:
     late = builders.submit(stranger, builders.predictions(edition, factor=1.02), method="Late")
-    later = timezone.now() + 2 * confidence.PATIENCE
+    later = timezone.now() + 2 * confidence.MAX_DELAY
     assert backlog.work_off(now=later, rng=random.Random(0)) == 1
     assert Evaluation.objects.get(submission=late).status == "SCORED"
 
@@ -265,21 +266,31 @@ def test_a_worker_that_is_to_end_leaves_the_work_to_others(entries: list[Submiss
     assert not Edition.objects.exclude(inferred_at=None).exists()
 
 
-def test_an_edition_that_is_being_scored_has_patience_but_not_for_ever(
+def test_an_edition_that_is_being_scored_is_waited_for_but_not_for_ever(
     inferred: list[Submission], edition: Edition, tmp_path: Path
 ) -> None:
     prepared = open_edition(corrected(tmp_path, factor=1.3))
-    held = truth_values.readable_digests()
+    readable_truths = truth_values.readable_digests()
     now = timezone.now()
-    assert prepared not in stale(now=now, held=held)
-    assert prepared in stale(now=now + 2 * confidence.PATIENCE, held=held)
-    assert prepared not in stale(now=now + 2 * confidence.PATIENCE, held=set())
+    assert prepared not in stale(now=now, readable_truths=readable_truths)
+    assert prepared in stale(now=now + 2 * confidence.MAX_DELAY, readable_truths=readable_truths)
+    assert prepared not in stale(now=now + 2 * confidence.MAX_DELAY, readable_truths=set())
 
 
 def test_a_digest_and_the_board_choose_the_same_entries(inferred: list[Submission], edition: Edition) -> None:
     chosen = {row.evaluation_id for row in confidence.ranked(confidence.active_entries(edition))}
     board = listing.board(split=edition.split, viewer=ANYBODY)
     assert chosen == {entry.evaluation_id for entry in board.entries if entry.evaluation_id}
+
+
+def test_one_worker_at_a_time_computes_an_edition(entries: list[Submission], edition: Edition) -> None:
+    edition.refresh_from_db()
+    now = timezone.now()
+    EditionRanges.objects.create(edition=edition, claimed_until=now + timedelta(minutes=1))
+    assert not confidence.infer(Entries.of(edition), now=now)
+    EditionRanges.objects.update(claimed_until=now - timedelta(minutes=1))  # its worker has died
+    assert confidence.infer(Entries.of(edition), now=now)
+    assert EditionRanges.objects.get().claimed_until is None
 
 
 def test_of_two_workers_that_made_the_same_the_second_writes_nothing(

@@ -1,4 +1,4 @@
-"""When all that was inferred is made anew, and what it is made of."""
+"""Intervals and rank ranges are computed again when their inputs change, and from what."""
 
 import pytest
 

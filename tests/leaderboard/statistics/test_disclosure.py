@@ -1,4 +1,4 @@
-"""What is told of hidden values: coarse intervals, classes of p, and only of public methods of two teams."""
+"""Statistics of hidden values: coarse intervals and classes of p, of public methods of two teams only."""
 
 import math
 from collections.abc import Callable
@@ -52,9 +52,9 @@ def test_ends_are_rounded_outwards_to_a_tenth_of_the_width(
         assert math.copysign(1, end) == 1 or end < 0
 
 
-def published(found: Difference, shown: Difference, *, is_hidden: bool = True) -> Difference:
+def published(exact: Difference, shown: Difference, *, is_hidden: bool = True) -> Difference:
     edition = Edition(split=Split(is_hidden=is_hidden), ground_truth_id="sha256:0", decimals=1)
-    return disclosure.published_difference(found, shown, edition=edition)
+    return disclosure.published_difference(exact, shown, edition=edition)
 
 
 @pytest.mark.parametrize(
@@ -70,22 +70,22 @@ def published(found: Difference, shown: Difference, *, is_hidden: bool = True) -
 def test_ends_of_a_difference_are_rounded_outwards_and_p_alone_judges_it(
     low: float, high: float, p: float, ends: tuple[float, float]
 ) -> None:
-    found = Difference(round((low + high) / 2, 1), low, high, p)
-    told = published(found, found)
-    assert (told.low, told.high) == ends
-    assert told.low <= low
-    assert high <= told.high
-    assert told.p is None
-    assert told.is_significant == (p < 0.05)
-    assert published(found, found, is_hidden=False) == found
+    exact = Difference(round((low + high) / 2, 1), low, high, p)
+    public = published(exact, exact)
+    assert (public.low, public.high) == ends
+    assert public.low <= low
+    assert high <= public.high
+    assert public.p is None
+    assert public.is_significant == (p < 0.05)
+    assert published(exact, exact, is_hidden=False) == exact
 
 
-def test_what_is_published_alike_is_not_told_apart() -> None:
-    told = published(Difference(0.03, 0.01, 0.05, 0.0001), Difference(0.0, 0.0, 0.1, 1.0))
-    assert (told.p, told.p_below) == (None, 1.0)
-    assert told.low is not None
-    assert told.high is not None
-    assert told.low <= 0 <= told.high
+def test_values_published_alike_are_not_significantly_different() -> None:
+    public = published(Difference(0.03, 0.01, 0.05, 0.0001), Difference(0.0, 0.0, 0.1, 1.0))
+    assert (public.p, public.p_below) == (None, 1.0)
+    assert public.low is not None
+    assert public.high is not None
+    assert public.low <= 0 <= public.high
 
 
 def test_too_few_recordings_stay_too_few() -> None:
@@ -102,17 +102,17 @@ def test_nothing_finer_of_a_hidden_split_is_in_the_database(
         step = disclosure.step_of(0.8 * (high - low), decimals=1)
         assert (low / step, high / step) == pytest.approx((round(low / step), round(high / step)), abs=1e-6)
     (row,) = Comparison.objects.all()
-    for found in row.differences.values():
-        assert found["p"] is None
+    for difference in row.differences.values():
+        assert difference["p"] is None
 
 
-def test_p_is_told_as_a_class_in_every_form(entries: list[Submission], rival: Rival, client: Client) -> None:
+def test_p_is_a_class_in_every_form(entries: list[Submission], rival: Rival, client: Client) -> None:
     other = rival(1.3)
     ask(entries[0], other)
     builders.infer_all()
     (pair,) = ask(entries[0], other).pairs
-    found = known(pair)["mid"]
-    assert (found.p, found.p_below, found.is_significant) == (None, 0.001, True)
+    difference = known(pair)["mid"]
+    assert (difference.p, difference.p_below, difference.is_significant) == (None, 0.001, True)
     query = {"split": "test", "m": [str(entries[0].method_id), str(other.method_id)]}
     answer = client.get("/api/v1/compare", query).json()["pairs"][0]
     assert answer["withheld"] == ""
@@ -130,12 +130,12 @@ def test_p_is_told_as_a_class_in_every_form(entries: list[Submission], rival: Ri
 
 
 def plain(pair: comparisons.Pair) -> None:
-    """Of this pair nothing but the difference of what the board says is told."""
-    for name, found in known(pair).items():
+    """Assert that this pair has only the difference of the board's values."""
+    for name, difference in known(pair).items():
         one, other = pair.first.scores[name], pair.second.scores[name]
         assert one is not None
         assert other is not None
-        assert found == Difference(round(one - other, 1) + 0.0, None, None, None)
+        assert difference == Difference(round(one - other, 1) + 0.0, None, None, None)
     assert Comparison.objects.count() == 0
 
 
@@ -193,12 +193,12 @@ def test_an_anonymous_method_of_another_team_is_compared_once_it_is_public(
 def test_calling_a_hidden_split_open_in_the_database_tells_no_more_of_it(
     entries: list[Submission], edition: Edition, owner: User, rival: Rival, client: Client
 ) -> None:
-    """The attack of somebody who has the web process: `is_hidden = false`, and everything made anew."""
+    """The attack of a person who has the web process: `is_hidden = false`, and everything computed again."""
     other = rival(1.07)
     ask(entries[0], other)
     builders.infer_all()
     scores = Score.objects.order_by("pk").values_list("low", "high")
-    before, (told,) = list(scores), Comparison.objects.values_list("differences", flat=True)
+    before, (stored,) = list(scores), Comparison.objects.values_list("differences", flat=True)
 
     Comparison.objects.all().delete()
     Score.objects.update(low=None, high=None)
@@ -211,11 +211,11 @@ def test_calling_a_hidden_split_open_in_the_database_tells_no_more_of_it(
     builders.infer_all()
 
     assert list(scores.all()) == before
-    assert told in Comparison.objects.values_list("differences", flat=True)
+    assert stored in Comparison.objects.values_list("differences", flat=True)
     for sent in own:
         (pair,) = ask(*sent, viewer=owner).pairs
-        for found in known(pair).values():
-            assert (found.low, found.high, found.p, found.p_below) == (None, None, None, None)
+        for delta in known(pair).values():
+            assert (delta.low, delta.high, delta.p, delta.p_below) == (None, None, None, None)
         assert pair.withheld == (
             "No confidence interval and no p-value: the ground truth of test was imported as hidden. There, "
             "only public methods of different teams are compared; compare these two on a split with open "

@@ -1,4 +1,4 @@
-"""The floor of a board, what the ground truth itself scores: computed by workers, told beside the rows."""
+"""The floor of a board, what the ground truth itself scores: computed by workers, shown with the rows."""
 
 from django.test import Client
 

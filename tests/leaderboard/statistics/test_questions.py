@@ -42,7 +42,7 @@ def ask(
     address: str = "192.0.2.1",
     ago_s: float = 0,
 ) -> bool:
-    """Whether they are computed."""
+    """Say if they are computed."""
     now = timezone.now() - timedelta(seconds=ago_s)
     try:
         questions.ask(edition=edition, pairs=pairs, user=user, address=address, now=now)
@@ -53,7 +53,7 @@ def ask(
 
 def upcoming() -> tuple[Any, Any]:
     """The pair whose turn it is, which has had it with that."""
-    row = questions.waiting(held=truth_values.readable_digests())[0]
+    row = questions.waiting(readable_truths=truth_values.readable_digests())[0]
     questions.begin(row, now=timezone.now())
     Comparison.objects.filter(pk=row.pk).update(computed_at=timezone.now(), differences={})
     return row.first_id, row.second_id
@@ -65,7 +65,7 @@ def test_the_first_that_was_asked_for_is_computed_first(edition: Edition, pairs:
     assert [upcoming() for _ in range(5)] == list(reversed(pairs[:5]))
 
 
-def test_what_nobody_waits_for_comes_last_until_somebody_does(edition: Edition, pairs: Pairs) -> None:
+def test_what_nobody_waits_for_comes_last_until_a_reader_does(edition: Edition, pairs: Pairs) -> None:
     questions.note(edition=edition, pairs=pairs[:3])
     ask(edition, pairs[10])
     ask(edition, pairs[2])
@@ -76,7 +76,7 @@ def test_what_nobody_waits_for_comes_last_until_somebody_does(edition: Edition, 
 def test_a_pair_that_cannot_be_computed_keeps_nothing_else_waiting(edition: Edition, pairs: Pairs) -> None:
     ask(edition, pairs[0], ago_s=9)
     ask(edition, pairs[1], ago_s=5)
-    row = questions.waiting(held=truth_values.readable_digests())[0]
+    row = questions.waiting(readable_truths=truth_values.readable_digests())[0]
     questions.begin(row, now=timezone.now())
     assert upcoming() == pairs[1]
 
@@ -102,7 +102,7 @@ def test_asking_again_counts_nothing(
     assert client.get(f"/api/v1/compare?split=test&m={m}").status_code == 200
 
 
-def test_who_has_asked_for_too_many_is_told_on_the_page_and_in_the_api(
+def test_who_has_asked_for_too_many_reads_so_on_the_page_and_in_the_api(
     entries: list[Submission], edition: Edition, client: Client, settings: Settings
 ) -> None:
     settings.PAGE_RATES = settings.PAGE_RATES | {"compare": "1/hour"}

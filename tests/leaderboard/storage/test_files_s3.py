@@ -1,4 +1,4 @@
-"""The file store in an S3-compatible service: everything through it, and nothing beside it."""
+"""The file store in an S3-compatible service: everything goes through it, and nothing past it."""
 
 import json
 import subprocess
@@ -62,9 +62,9 @@ def at(endpoint: str) -> dict[str, Any]:
 def stored(bucket: Any, server: str, settings: Settings) -> s3.S3FileStore:
     """The store that the application uses in this test."""
     settings.STORAGES = {**settings.STORAGES, **at(server)}
-    found = files.store()
-    assert isinstance(found, s3.S3FileStore)
-    return found
+    store = files.store()
+    assert isinstance(store, s3.S3FileStore)
+    return store
 
 
 @pytest.fixture
@@ -161,7 +161,7 @@ def test_key_in_the_url_is_refused_and_not_repeated() -> None:
 # --- cleaning up ----------------------------------------------------------------------------------------
 
 
-def test_orphan_in_the_bucket_is_found_and_removed(stored: s3.S3FileStore, bucket: Any, db: None) -> None:
+def test_orphan_in_the_bucket_is_listed_and_removed(stored: s3.S3FileStore, bucket: Any, db: None) -> None:
     kept = files.save_predictions(ContentFile(b'{"0": 1.5}', name="p.json"), now=timezone.now())
     assert list(orphans.orphans(now=timezone.now())) == []
     in_two_days = timezone.now() + timedelta(days=2)
@@ -216,8 +216,8 @@ def test_an_sqlite_database_and_the_files_of_a_bucket_come_back_once(
     assert "1 board is the same byte for byte" in done.stdout, done.stderr
     assert "ada@example.org" in done.stdout, done.stderr
     assert "The database has users already" in done.stderr
-    said = json.loads((folder / contents.LIST).read_text())
-    assert (said["vendor"], said["missing"]) == ("sqlite", [])
+    listed = json.loads((folder / contents.LIST).read_text())
+    assert (listed["vendor"], listed["missing"]) == ("sqlite", [])
     assert folder.stat().st_mode & 0o077 == 0
     [manifest] = bucket.objects.all()
     assert manifest.key.startswith("files/manifests/")

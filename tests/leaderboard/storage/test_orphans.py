@@ -112,10 +112,10 @@ def test_row_that_came_meanwhile_saves_its_file(edition: Edition, owner: User, s
     path = path_of(keep(data).digest, settings)
     age(path, hours=48)
     now = timezone.now()
-    [found] = orphans.orphans(now=now)
+    [row] = orphans.orphans(now=now)
     builders.submit(owner, data)
     age(path, hours=48)
-    assert not orphans.remove(found, now=now)
+    assert not orphans.remove(row, now=now)
     assert path.exists()
 
 
@@ -140,6 +140,6 @@ def test_the_workers_clean_by_themselves_and_say_what_they_removed(orphan: Path,
 
 def test_two_that_clean_at_once_remove_a_file_once(orphan: Path) -> None:
     now = timezone.now()
-    found = [list(orphans.orphans(now=now)) for _ in range(2)]
-    assert [[orphans.remove(row, now=now) for row in rows] for rows in found] == [[True], [False]]
+    listings = [list(orphans.orphans(now=now)) for _ in range(2)]
+    assert [[orphans.remove(row, now=now) for row in rows] for rows in listings] == [[True], [False]]
     assert AuditEvent.objects.filter(verb="removed", noun="File").count() == 1

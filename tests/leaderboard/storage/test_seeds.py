@@ -39,13 +39,13 @@ def test_a_secret_that_is_there_is_never_replaced(edition: Edition) -> None:
     assert seeds.path().read_text() == before
 
 
-def test_a_damaged_secret_is_said_and_nothing_is_made_of_it(edition: Edition) -> None:
+def test_a_damaged_secret_is_an_error_and_no_seed_is_made_of_it(edition: Edition) -> None:
     seeds.path().write_text("abc\n")
     with pytest.raises(seeds.NoSecret, match="expected 32; put it back from the backup"):
         seeds.seed_of(edition)
 
 
-def test_where_it_can_be_neither_read_nor_made_it_is_said_how(edition: Edition) -> None:
+def test_where_it_can_be_neither_read_nor_made_the_error_says_how(edition: Edition) -> None:
     seeds.path().unlink()
     seeds.path().mkdir()
     with pytest.raises(seeds.NoSecret, match=r"manage\.py make_seed_key"):
@@ -56,7 +56,7 @@ def test_the_secret_is_in_no_row_and_in_no_log(
     entries: list[Submission], edition: Edition, capfd: pytest.CaptureFixture[str]
 ) -> None:
     builders.infer_all()
-    told = repr(list(Edition.objects.values())) + repr(list(Score.objects.values()))
-    told += repr(list(Comparison.objects.values())) + "".join(capfd.readouterr())
+    text = repr(list(Edition.objects.values())) + repr(list(Score.objects.values()))
+    text += repr(list(Comparison.objects.values())) + "".join(capfd.readouterr())
     for secret in (seeds.path().read_text().strip(), confidence.seed_of(edition)):
-        assert secret not in told
+        assert secret not in text

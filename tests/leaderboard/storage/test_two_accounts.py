@@ -105,10 +105,10 @@ def test_what_the_web_process_is_sent_is_scored_by_a_worker_and_what_workers_wri
 
     def scored() -> float:
         with files.opened_predictions(digest) as file:
-            found = evaluator.read_predictions(file.read(), manifest=truth.manifest)
-        files.save_aligned(found)
+            predictions = evaluator.read_predictions(file.read(), manifest=truth.manifest)
+        files.save_aligned(predictions)
         files.store().delete(files.predictions_name(digest))
-        mid = evaluator.evaluate(found, truth_values.load(truth.digest)).scores["overall"].mid
+        mid = evaluator.evaluate(predictions, truth_values.load(truth.digest)).scores["overall"].mid
         assert mid is not None
         return mid
 
@@ -149,8 +149,8 @@ def test_the_web_account_opens_nothing_that_is_the_workers(host: Host) -> None:
         paths = [host.private, truth_values.values_path(host.truth.digest), seeds.path()]
         paths += [of_worker / "environ", of_worker / "root", of_worker / "mem"]
         paths += [of_worker / "root" / str(seeds.path()).lstrip("/")]
-        found = [as_account("tsttc-web", partial(attack, path)) for path in paths]
+        contents = [as_account("tsttc-web", partial(attack, path)) for path in paths]
     finally:
         ended.set()
         worker.join()
-    assert found == [""] * 7
+    assert contents == [""] * 7

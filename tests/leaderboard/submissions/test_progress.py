@@ -19,7 +19,7 @@ def progress(evaluation: Evaluation) -> Progress:
     return progress_of(Evaluation.objects.get(pk=evaluation.pk).submission)
 
 
-def test_place_counts_those_that_are_claimed_before(edition: Edition, owner: User) -> None:
+def test_position_counts_those_that_are_claimed_before(edition: Edition, owner: User) -> None:
     rescored = queue_rows.queued(edition, owner, priority=Evaluation.PRIORITY_RESCORE)
     rows = [queue_rows.queued(edition, owner) for _ in range(4)]
     assert [progress(row).n_ahead for row in rows] == [0, 1, 2, 3]
@@ -36,7 +36,7 @@ def test_one_that_waits_for_another_try_is_in_nobodys_way(edition: Edition, owne
     assert progress(second).n_ahead == 0
 
 
-def test_decided_submission_has_no_place_any_more(edition: Edition, owner: User) -> None:
+def test_decided_submission_has_no_position_any_more(edition: Edition, owner: User) -> None:
     row = queue_rows.queued(edition, owner)
     lifecycle.finalise(queue_rows.claim(), queue_rows.SCORED)
     done = progress(row)

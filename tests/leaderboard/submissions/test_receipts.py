@@ -42,14 +42,14 @@ def test_receipt_verifies_against_the_published_key_and_says_what_the_api_says(
     scored: Submission, edition: Edition, owner: User
 ) -> None:
     client = client_of(owner)
-    told = client.get(f"/api/v1/submissions/{scored.pk}").json()
-    found = verified(client.get(address(scored)).content)
-    assert found.scores == told["scores"]
-    assert found.counts == told["counts"]
-    assert (found.split, found.edition, found.protocol) == ("test", 1, "tsttc-1")
-    assert (found.ground_truth, found.file) == (edition.ground_truth_id, scored.digest)
-    assert (found.submission, found.method) == (str(scored.pk), "Foo")
-    assert found.site == "http://127.0.0.1:8000"
+    answer = client.get(f"/api/v1/submissions/{scored.pk}").json()
+    receipt = verified(client.get(address(scored)).content)
+    assert receipt.scores == answer["scores"]
+    assert receipt.counts == answer["counts"]
+    assert (receipt.split, receipt.edition, receipt.protocol) == ("test", 1, "tsttc-1")
+    assert (receipt.ground_truth, receipt.file) == (edition.ground_truth_id, scored.digest)
+    assert (receipt.submission, receipt.method) == (str(scored.pk), "Foo")
+    assert receipt.site == "http://127.0.0.1:8000"
     # Deterministic: whoever asks again has the same proof.
     assert client.get(address(scored)).content == client.get(address(scored)).content
 
@@ -59,9 +59,9 @@ def test_receipts_before_and_after_a_renaming_verify_and_name_one_method_by_its_
 ) -> None:
     before = client_of(owner).get(address(scored)).content
     scored.method.__class__.objects.update(name="Another famous method")
-    found = [verified(before), verified(client_of(owner).get(address(scored)).content)]
-    assert [one.method for one in found] == ["Foo", "Another famous method"]
-    assert {one.method_id for one in found} == {str(scored.method_id)}
+    both = [verified(before), verified(client_of(owner).get(address(scored)).content)]
+    assert [one.method for one in both] == ["Foo", "Another famous method"]
+    assert {one.method_id for one in both} == {str(scored.method_id)}
 
 
 def test_only_what_is_scored_and_stands_has_a_receipt(edition: Edition, owner: User) -> None:
@@ -98,7 +98,7 @@ def test_receipt_of_a_superseded_edition_still_verifies_and_says_which(
         assert client.get(f"{address(scored)}?edition={number}").json()["code"] == code
 
 
-def test_what_a_former_key_signed_verifies_after_another_took_its_place(
+def test_what_a_former_key_signed_verifies_after_another_replaced_it(
     scored: Submission, owner: User, settings: Settings
 ) -> None:
     before = client_of(owner).get(address(scored)).content
@@ -146,7 +146,7 @@ def test_command_makes_a_key_that_signs(settings: Settings) -> None:
 
 
 @pytest.mark.parametrize("key", ["", "A" * 44, "Ä" * 43])
-def test_malformed_key_is_found_at_the_start(settings: Settings, key: str) -> None:
+def test_malformed_key_is_reported_at_the_start(settings: Settings, key: str) -> None:
     settings.RECEIPT_KEY = key
     [error] = receipts.check_keys()
     assert "TSTTC_RECEIPT_KEY is malformed" in error.msg

@@ -1,4 +1,4 @@
-"""A refused upload leaves no file, and takes nobody else's away: equal bytes are one file."""
+"""A refused upload leaves no file, and removes no file of another submission: equal bytes are one file."""
 
 import os
 import random
@@ -45,7 +45,7 @@ def file_of(data: bytes) -> ContentFile:  # type: ignore[type-arg]  # of bytes
 
 
 def age(data: bytes) -> None:
-    """Make the file, if it is stored, so old that whoever sends it writes it again."""
+    """Make the file, if it is stored, so old that the next upload writes it again."""
     path = Path(files.store().path(files.predictions_name(files.measure(file_of(data)).digest)))
     if path.exists():
         os.utime(path, (0, 0))
@@ -86,7 +86,7 @@ def test_a_refused_file_that_a_submission_names_stays(
 def test_a_file_that_is_removed_before_its_row_is_written_is_kept_again(
     edition: Edition, owner: User, tmp_path: Path
 ) -> None:
-    """By somebody else who was refused with the same bytes."""
+    """Another user, refused with the same bytes, removes it."""
     teams.team_of(user=owner)
 
     def remove(execute: Callable[..., Any], sql: str, *rest: Any) -> Any:
@@ -140,9 +140,9 @@ class TestAtOnce:
         assert sum(at_once(12, sent)) == 1
         assert stored(tmp_path) == [Submission.objects.get().digest]
 
-    @pytest.mark.parametrize("held", ["refused", "accepted"])
+    @pytest.mark.parametrize("paused", ["refused", "accepted"])
     def test_no_moment_loses_the_bytes_that_another_team_has_acknowledged(
-        self, edition: Edition, owner: User, stranger: User, tmp_path: Path, held: str
+        self, edition: Edition, owner: User, stranger: User, tmp_path: Path, paused: str
     ) -> None:
         """One of the two is held after each of its statements in turn, while the other does all it can."""
         for user in (owner, stranger):
@@ -150,21 +150,21 @@ class TestAtOnce:
         # Of the same name as the other's method, so only the owner's is refused, and under the lock.
         builders.submit(owner, b"first", method="Foo")
         with crowd_on_postgres():
-            number, was_held = 0, True
-            while was_held:
+            number, was_paused = 0, True
+            while was_paused:
                 number += 1
                 data = b"%d" % number
                 actions: dict[str, Callable[[], object]] = {
                     "refused": partial(refused, owner, data),
                     "accepted": partial(builders.send, stranger, file_of(data)),
                 }
-                first, second = actions.pop(held), *actions.values()
+                first, second = actions.pop(paused), *actions.values()
 
-                def is_here(found: int, sql: str, number: int = number) -> bool:
-                    return found == number
+                def is_here(n_statements: int, sql: str, number: int = number) -> bool:
+                    return n_statements == number
 
                 outcome = meet(first, second, at=is_here)
-                was_held = outcome.was_held
+                was_paused = outcome.was_held
                 assert outcome.faults == (None, None)
                 [kept] = Submission.objects.filter(digest=files.measure(file_of(data)).digest)
                 assert kept.digest in stored(tmp_path), f"held at statement {number}"
@@ -178,10 +178,10 @@ def test_a_method_that_another_request_makes_meanwhile_is_the_same_method(
     first = [lambda: builders.send(owner, file_of(b"first"), method="Foo")]
 
     def makes_it(execute: Callable[..., Any], sql: str, *rest: Any) -> Any:
-        found = execute(sql, *rest)
+        cursor = execute(sql, *rest)
         if first and '"leaderboard_method"."name" = ' in sql:
             first.pop()()
-        return found
+        return cursor
 
     with connection.execute_wrapper(makes_it):
         second = builders.send(owner, file_of(b"second"), method="Foo")

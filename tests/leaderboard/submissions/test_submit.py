@@ -29,13 +29,13 @@ def test_withdrawn_bytes_may_be_sent_again(edition: Edition, owner: User) -> Non
     assert builders.submit(owner, data) != first
 
 
-def test_somebody_without_a_name_gets_a_team_that_reveals_no_address(edition: Edition, db: None) -> None:
+def test_a_user_without_a_name_gets_a_team_that_reveals_no_address(edition: Edition, db: None) -> None:
     nameless = User.objects.create_user("very.private@example.org", "correct horse")
     team = builders.submit(nameless, builders.predictions(edition)).method.team
     assert re.fullmatch("Team [0-9a-f]{6}", team.name)
 
 
-def test_what_is_said_of_a_method_later_replaces_what_was_said(edition: Edition, owner: User) -> None:
+def test_what_a_later_submission_says_of_a_method_replaces_the_former(edition: Edition, owner: User) -> None:
     builders.submit(owner, builders.predictions(edition), description="old", code_url="https://example.org/c")
     builders.submit(owner, builders.predictions(edition, factor=1.2), description="new")
     method = Method.objects.get()

@@ -24,7 +24,7 @@ from tests.leaderboard.web.maintain import queue_rows
 
 pytestmark = pytest.mark.slow
 
-PATIENCE_S = 180
+TIMEOUT_S = 180
 
 
 def test_sweep_takes_back_what_dead_workers_hold(edition: Edition, owner: User) -> None:
@@ -71,7 +71,7 @@ def test_workers_that_ask_at_the_same_moment_sweep_once(done: list[str]) -> None
 
     def after_all_looks(execute: Callable[..., Any], sql: str, *rest: Any) -> Any:
         if sql.startswith("UPDATE") and "sweep_begun_at" in sql:
-            all_have_looked.wait(PATIENCE_S)
+            all_have_looked.wait(TIMEOUT_S)
         return execute(sql, *rest)
 
     def ask() -> None:
@@ -83,7 +83,7 @@ def test_workers_that_ask_at_the_same_moment_sweep_once(done: list[str]) -> None
     for thread in asking:
         thread.start()
     for thread in asking:
-        thread.join(PATIENCE_S)
+        thread.join(TIMEOUT_S)
     assert done == ["swept"]
 
 
@@ -158,7 +158,7 @@ def test_a_look_decides_everything_that_waits(edition: Edition, owner: User) -> 
     assert set(Evaluation.objects.values_list("status", flat=True)) == {Status.SCORED}
 
 
-def test_a_look_begins_nothing_once_it_is_told_to_stop(edition: Edition, owner: User) -> None:
+def test_a_look_begins_nothing_once_it_is_to_stop(edition: Edition, owner: User) -> None:
     builders.submit(owner, builders.predictions(edition))
     stopping = threading.Event()
     stopping.set()
@@ -172,7 +172,7 @@ def polling(act: Callable[..., object]) -> Iterator[Poller]:
     poller = Poller(act, every_s=0.01, rng=random.Random(0))
     poller.start()
     yield poller
-    pollers.stop_pollers([poller], patience_s=PATIENCE_S)
+    pollers.stop_pollers([poller], timeout_s=TIMEOUT_S)
     assert not poller.is_alive()
 
 
@@ -186,7 +186,7 @@ def test_poller_looks_again_after_a_look_that_broke() -> None:
         looked_again.set()
 
     with polling(look):
-        assert looked_again.wait(PATIENCE_S)
+        assert looked_again.wait(TIMEOUT_S)
 
 
 def test_poller_finishes_what_is_in_hand_before_it_stops() -> None:
@@ -194,17 +194,17 @@ def test_poller_finishes_what_is_in_hand_before_it_stops() -> None:
 
     def look(*, rng: random.Random, stopping: threading.Event) -> None:
         begun.set()
-        assert stopping.wait(PATIENCE_S), "it is told that it is to end"
-        may_finish.wait(PATIENCE_S)
+        assert stopping.wait(TIMEOUT_S), "it is told that it is to end"
+        may_finish.wait(TIMEOUT_S)
         finished.set()
 
     with polling(look) as poller:
-        assert begun.wait(PATIENCE_S)
+        assert begun.wait(TIMEOUT_S)
         stop = threading.Thread(
-            target=pollers.stop_pollers, args=([poller],), kwargs={"patience_s": PATIENCE_S}
+            target=pollers.stop_pollers, args=([poller],), kwargs={"timeout_s": TIMEOUT_S}
         )
         stop.start()
         assert not finished.is_set()
         may_finish.set()
-        stop.join(PATIENCE_S)
+        stop.join(TIMEOUT_S)
         assert finished.is_set()

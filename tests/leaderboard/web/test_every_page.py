@@ -119,7 +119,7 @@ def assert_nothing_from_elsewhere(html: pages.Element) -> None:
             element.tag == "link" and element.attributes["rel"] not in LEADING_ON
         ):
             names = ("src", "srcset", "href")
-            address = next((found for name in names if (found := element.attributes.get(name))), "")
+            address = next((value for name in names if (value := element.attributes.get(name))), "")
             assert OWN.match(address), element
             if not address.startswith(("/methods/", "data:")):  # a badge is drawn, and no file
                 assert finders.find(address.removeprefix("/static/")), f"{address} is no static file"

@@ -1,4 +1,4 @@
-"""What somebody's first look at a board, or at the landing page, costs them."""
+"""What the first look at a board, or at the landing page, costs a visitor."""
 
 import gzip
 import re

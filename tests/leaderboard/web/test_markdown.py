@@ -23,8 +23,8 @@ from tests import pages
 )
 def test_no_text_becomes_a_script_an_image_or_a_style(text: str) -> None:
     root = pages.read(f"<main>{markdown.page(text).html}</main>")
-    found = root.everything()
-    assert {each.tag for each in found} <= {
+    elements = root.everything()
+    assert {each.tag for each in elements} <= {
         "main",
         "p",
         "a",
@@ -38,9 +38,9 @@ def test_no_text_becomes_a_script_an_image_or_a_style(text: str) -> None:
         "td",
     }
     assert all(
-        set(each.attributes) <= {"href", "id", "class", "tabindex", "role", "aria-label"} for each in found
+        set(each.attributes) <= {"href", "id", "class", "tabindex", "role", "aria-label"} for each in elements
     )
-    hrefs = [each.attributes["href"] for each in found if each.tag == "a"]
+    hrefs = [each.attributes["href"] for each in elements if each.tag == "a"]
     assert all(href.startswith(("https://elsewhere.example/", "#")) for href in hrefs)
 
 

@@ -44,10 +44,10 @@ def test_all_windows_at_once_are_as_the_loop_over_pairs(depth: list[int], gaps: 
     depth_m = np.array(depth) / 97
     time_s = np.cumsum(gaps[: len(depth)]) / 10
     there = np.ones((len(depth), 1), dtype=bool)
-    found = consensus_velocity(time_s[:, None], depth_m[:, None], there)
+    velocity = consensus_velocity(time_s[:, None], depth_m[:, None], there)
     slope, n_inliers = literal_consensus(time_s, depth_m)
-    assert found.n_inliers[0] == n_inliers
-    assert found.mps[0] == pytest.approx(slope, rel=1e-9, abs=1e-9)
+    assert velocity.n_inliers[0] == n_inliers
+    assert velocity.mps[0] == pytest.approx(slope, rel=1e-9, abs=1e-9)
 
 
 def test_frames_that_are_not_there_change_nothing() -> None:
@@ -57,9 +57,9 @@ def test_frames_that_are_not_there_change_nothing() -> None:
     there = np.ones(time_s.shape, dtype=bool)
     there[:4] = False
     short = consensus_velocity(time_s[4:], depth_m[4:], there[4:])
-    found = consensus_velocity(time_s, np.where(there, depth_m, 99.0), there)
-    assert np.array_equal(found.mps, short.mps)
-    assert (found.n_frames == 6).all()
+    velocity = consensus_velocity(time_s, np.where(there, depth_m, 99.0), there)
+    assert np.array_equal(velocity.mps, short.mps)
+    assert (velocity.n_frames == 6).all()
 
 
 def test_fewer_than_three_frames_have_no_velocity() -> None:
@@ -73,8 +73,8 @@ def test_fewer_than_three_frames_have_no_velocity() -> None:
 def test_velocities_of_ten_noisy_frames_cost_at_most_2_6_mid() -> None:
     time_s, depth_m, true_m, mps = noisy_windows()
     there = np.ones(time_s.shape, dtype=bool)
-    found = consensus_velocity(time_s, depth_m, there)
-    assert MID.errors(-true_m / found.mps, -true_m / mps).mean() <= 2.6
-    assert MID.errors(-found.depth_m / found.mps, -true_m / mps).mean() <= 2.6
+    velocity = consensus_velocity(time_s, depth_m, there)
+    assert MID.errors(-true_m / velocity.mps, -true_m / mps).mean() <= 2.6
+    assert MID.errors(-velocity.depth_m / velocity.mps, -true_m / mps).mean() <= 2.6
     plain = least_squares_velocity(time_s, depth_m, there)
     assert MID.errors(-true_m / plain.mps, -true_m / mps).mean() > 10

@@ -16,11 +16,11 @@ LINE = "{frame} 7 Car {truncated} 0 0.1 100 100 140 130 1.5 1.8 4.0 {x} 1.0 {z} 
 def test_the_ground_truth_of_kitti_dev_is_reproduced(
     kitti: Path, kitti_labels: Path, depth: Depth, least: float
 ) -> None:
-    found = annotate(read_kitti(kitti_labels), cut="overlapping", depth=depth).table
+    annotated = annotate(read_kitti(kitti_labels), cut="overlapping", depth=depth).table
     own = dict(
         zip(
-            zip(found.bag_stamp, found.cam_id, found.ts_ns, found.track_id, strict=True),
-            found.ttc_s,
+            zip(annotated.bag_stamp, annotated.cam_id, annotated.ts_ns, annotated.track_id, strict=True),
+            annotated.ttc_s,
             strict=True,
         )
     )
@@ -40,10 +40,10 @@ def write_labels(folder: Path, *, n_frames: int = 6, **fields: object) -> Path:
 
 
 def test_a_label_gives_names_and_the_nearest_corner(tmp_path: Path) -> None:
-    found = annotate(read_kitti(write_labels(tmp_path)))
-    assert (found.table.bag_stamp, found.table.cam_id, found.table.track_id) == (["0003"], ["2"], ["7"])
-    assert found.table.ts_ns == [500_000_000]
-    assert found.table.ttc_s == pytest.approx([(15 - 0.9) / 10])
+    truth = annotate(read_kitti(write_labels(tmp_path)))
+    assert (truth.table.bag_stamp, truth.table.cam_id, truth.table.track_id) == (["0003"], ["2"], ["7"])
+    assert truth.table.ts_ns == [500_000_000]
+    assert truth.table.ttc_s == pytest.approx([(15 - 0.9) / 10])
 
 
 @pytest.mark.parametrize(

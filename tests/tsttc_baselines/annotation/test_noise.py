@@ -26,10 +26,10 @@ def test_the_noise_is_the_error_of_the_labels() -> None:
     frame, track = np.array(table.ts_ns) // 10**8, np.array(table.track_id, dtype=int)
     error = MID.errors(table.ttc_s, true_s[frame, track])
     whole = np.array(table.ts_ns) >= 9 * 10**8
-    found = label_noise(*successive(table))[0]
-    assert found.n_pairs == 150 * 19
-    assert found.noise == pytest.approx(error[whole].mean(), rel=0.2)
-    assert found.jitter < found.noise
+    estimate = label_noise(*successive(table))[0]
+    assert estimate.n_pairs == 150 * 19
+    assert estimate.noise == pytest.approx(error[whole].mean(), rel=0.2)
+    assert estimate.jitter < estimate.noise
 
 
 def test_pairs_are_successive_frames_of_one_vehicle() -> None:

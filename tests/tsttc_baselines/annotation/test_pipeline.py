@@ -20,9 +20,9 @@ def steady(n_tracks: int = 1, *, n_frames: int = N_FRAMES, mps: float = -10.0) -
 def test_time_to_contact_is_depth_over_velocity_on_both_sides_of_the_vehicle() -> None:
     ahead, behind = steady(), -steady() - 4.0
     for depth_m in (ahead, behind):
-        found = annotate(tracks_of(depth_m))
-        assert found.table.ttc_s == pytest.approx([2.5, 1.9])
-        assert found.table.ts_ns == [500_000_000, 1_100_000_000]
+        annotated = annotate(tracks_of(depth_m))
+        assert annotated.table.ttc_s == pytest.approx([2.5, 1.9])
+        assert annotated.table.ts_ns == [500_000_000, 1_100_000_000]
     assert annotate(tracks_of(steady(mps=10.0))).table.ttc_s == pytest.approx([-3.5, -4.1])
 
 
@@ -43,7 +43,7 @@ def test_the_choice_by_radar_has_at_most_0_7_of_the_error_of_ten_frames_when_a_v
     without = frame_ttc(tracks_of(depth_m))
     late = np.tile(np.arange(30)[:, None] >= 15, (1, depth_m.shape[1])).ravel()
     chosen, alone = (
-        MID.errors(found.ttc_s[late], ttc_s.ravel()[late]).mean() for found in (with_radar, without)
+        MID.errors(frames.ttc_s[late], ttc_s.ravel()[late]).mean() for frames in (with_radar, without)
     )
     assert chosen <= 0.7 * alone
     assert set(without.q.tolist()) == {10}
@@ -54,12 +54,12 @@ def test_gaps_of_the_radar_leave_the_longest_window_and_are_counted() -> None:
     depth_m, mps, _ = braking(20)
     gaps = mps.copy()
     gaps[17] = np.nan
-    found = annotate(tracks_of(depth_m, radar_mps=gaps), cut="overlapping")
-    at_gap = np.array(found.table.ts_ns) == 17 * 10**8
-    chosen = found.frames.choice[found.rows[:, -1]]
+    annotated = annotate(tracks_of(depth_m, radar_mps=gaps), cut="overlapping")
+    at_gap = np.array(annotated.table.ts_ns) == 17 * 10**8
+    chosen = annotated.frames.choice[annotated.rows[:, -1]]
     assert set(chosen[at_gap].tolist()) <= {"no-radar", "agree"}
-    assert found.counts["without_radar"] == 20
-    assert found.counts["choice_no-radar"] == np.count_nonzero(chosen == "no-radar") > 0
+    assert annotated.counts["without_radar"] == 20
+    assert annotated.counts["choice_no-radar"] == np.count_nonzero(chosen == "no-radar") > 0
 
 
 def test_of_windows_that_differ_the_one_nearest_to_the_radar_counts() -> None:
@@ -84,25 +84,25 @@ def test_truncated_and_small_frames_end_a_sequence_and_still_count_for_the_veloc
     tracks.is_truncated[2] = True
     tracks.box_px[3, 2] = 110.0
     tracks.box_px[4] = np.nan
-    found = annotate(tracks)
-    assert found.table.ts_ns == [1_000_000_000]
-    assert found.frames.n_frames[found.rows[0, -1]] == 10
-    assert [found.counts[name] for name in ("truncated", "small_box", "without_box")] == [1, 1, 1]
+    annotated = annotate(tracks)
+    assert annotated.table.ts_ns == [1_000_000_000]
+    assert annotated.frames.n_frames[annotated.rows[0, -1]] == 10
+    assert [annotated.counts[name] for name in ("truncated", "small_box", "without_box")] == [1, 1, 1]
 
 
-def test_a_track_that_was_lost_begins_anew() -> None:
+def test_a_track_that_was_lost_begins_again() -> None:
     tracks = tracks_of(np.vstack([steady(), steady() + 50]))
     tracks.ts_ns[N_FRAMES:] += 5_000_000_000
-    found = annotate(tracks)
-    first_after = found.rows[2, -1]
-    assert found.frames.n_frames[first_after] == 6
-    assert found.table.ttc_s[2] == pytest.approx(7.5)
+    annotated = annotate(tracks)
+    first_after = annotated.rows[2, -1]
+    assert annotated.frames.n_frames[first_after] == 6
+    assert annotated.table.ttc_s[2] == pytest.approx(7.5)
 
 
 def test_what_stands_still_is_counted_and_left_out() -> None:
-    standing = annotate(tracks_of(np.hstack([steady(), np.full((N_FRAMES, 1), 20.0)])))
-    assert standing.counts["standing_still"] == 2
-    assert len(standing.table.ttc_s) == 2
+    annotated = annotate(tracks_of(np.hstack([steady(), np.full((N_FRAMES, 1), 20.0)])))
+    assert annotated.counts["standing_still"] == 2
+    assert len(annotated.table.ttc_s) == 2
 
 
 def test_tracks_without_any_sequence_are_a_problem() -> None:
@@ -123,6 +123,6 @@ def test_a_frame_off_the_line_has_its_depth_as_measured_or_as_the_line_says(
 ) -> None:
     depth_m = steady()
     depth_m[5] += off_m
-    found = {depth: annotate(tracks_of(depth_m), depth=depth).table.ttc_s[0] for depth in DEPTHS}
-    assert found == pytest.approx(expected)
-    assert annotate(tracks_of(depth_m)).table.ttc_s[0] == found["checked"]
+    ttc_s = {depth: annotate(tracks_of(depth_m), depth=depth).table.ttc_s[0] for depth in DEPTHS}
+    assert ttc_s == pytest.approx(expected)
+    assert annotate(tracks_of(depth_m)).table.ttc_s[0] == ttc_s["checked"]

@@ -22,19 +22,19 @@ def test_columns_may_have_any_order_and_company(tmp_path: Path) -> None:
     mixed = "\n".join(
         ",".join(["x" if number else "note", *reversed(line)]) for number, line in enumerate(lines)
     )
-    found = read_tracks(write(tmp_path, mixed))
-    assert found.key == (("r", "1", "1"),) * 2
-    assert found.centre_m[:, 1].tolist() == [32.0, 31.0]
-    assert not found.has_radar
+    tracks = read_tracks(write(tmp_path, mixed))
+    assert tracks.key == (("r", "1", "1"),) * 2
+    assert tracks.centre_m[:, 1].tolist() == [32.0, 31.0]
+    assert not tracks.has_radar
 
 
 def test_a_radar_column_may_have_gaps_and_boxes_may_be_empty(tmp_path: Path) -> None:
     edges = dict.fromkeys(("box_x1", "box_y1", "box_x2", "box_y2"), "")
     rows = [f"{row(0)},-3.5", f"{row(1, **edges)},", f"{row(2)},nan"]
-    found = read_tracks(write(tmp_path, text(rows, header=f"{HEADER},radar_velocity")))
-    assert found.has_radar
-    assert np.isnan(found.radar_mps).tolist() == [False, True, True]
-    assert np.isnan(found.box_px).all(axis=1).tolist() == [False, True, False]
+    tracks = read_tracks(write(tmp_path, text(rows, header=f"{HEADER},radar_velocity")))
+    assert tracks.has_radar
+    assert np.isnan(tracks.radar_mps).tolist() == [False, True, True]
+    assert np.isnan(tracks.box_px).all(axis=1).tolist() == [False, True, False]
 
 
 @pytest.mark.parametrize(

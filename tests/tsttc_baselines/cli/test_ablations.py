@@ -64,7 +64,7 @@ def test_a_sequence_is_drawn(tsttc: Tsttc, frames: Path, tmp_path: Path, suffix:
         ("1", "1.pdf", "1.pdf ends in .pdf; expected .svg or .png."),
     ],
 )
-def test_what_cannot_be_drawn_is_said_in_a_sentence(
+def test_what_cannot_be_drawn_is_refused_in_a_sentence(
     tsttc: Tsttc, frames: Path, tmp_path: Path, anno_id: str, name: str, sentence: str
 ) -> None:
     result = tsttc("baseline", "show", frames, anno_id, "-o", tmp_path / name)

@@ -46,11 +46,11 @@ def test_counts_come_as_a_document(tsttc: Tsttc, tmp_path: Path) -> None:
     source, out = tmp_path / "track.csv", tmp_path / "truth.csv"
     rows = [f"{line},{'' if number == 3 else -10}" for number, line in enumerate(approaching())]
     source.write_text(text(rows, header=f"{HEADER},radar_velocity"))
-    found = json.loads(tsttc("baseline", "annotate", source, "-o", out, "--overlapping", "--json").stdout)
-    assert found["counts"]["sequences"] == 7
-    assert found["counts"]["without_radar"] == 1
-    said = tsttc("baseline", "annotate", source, "-o", out).stdout
-    assert "The radar has no velocity for 1 observation." in said
+    document = json.loads(tsttc("baseline", "annotate", source, "-o", out, "--overlapping", "--json").stdout)
+    assert document["counts"]["sequences"] == 7
+    assert document["counts"]["without_radar"] == 1
+    printed = tsttc("baseline", "annotate", source, "-o", out).stdout
+    assert "The radar has no velocity for 1 observation." in printed
 
 
 def test_a_rejected_table_names_its_lines_and_leaves_no_file(tsttc: Tsttc, tmp_path: Path) -> None:
@@ -72,7 +72,7 @@ def test_a_folder_needs_its_format(tsttc: Tsttc, tmp_path: Path, track_file: Pat
         assert expected in " ".join(result.stderr.split())
 
 
-def test_the_noise_of_labels_is_told_by_range_with_what_it_assumes(
+def test_the_noise_of_labels_is_shown_by_range_with_what_it_assumes(
     tsttc: Tsttc, tmp_path: Path, track_file: Path
 ) -> None:
     out = tmp_path / "truth.csv"
@@ -82,5 +82,5 @@ def test_the_noise_of_labels_is_told_by_range_with_what_it_assumes(
         assert result.exit_code == 0
         assert result.stdout.splitlines()[1].split() == ["overall", "6", "0.0", "0.0"]
         assert "successive labels share 9 of their 10 frames" in result.stdout
-    found = json.loads(tsttc("baseline", "noise", out, "--frames", "1", "--json").stdout)
-    assert (found["frames"], found["ranges"][0]["n_pairs"]) == (1, 6)
+    document = json.loads(tsttc("baseline", "noise", out, "--frames", "1", "--json").stdout)
+    assert (document["frames"], document["ranges"][0]["n_pairs"]) == (1, 6)

@@ -13,12 +13,12 @@ from tsttc_baselines.cli import COMMANDS, baseline
 
 
 def command(name: str) -> click.Command:
-    found = baseline.get_command(click.Context(baseline), name)
-    assert found is not None
-    return found
+    subcommand = baseline.get_command(click.Context(baseline), name)
+    assert subcommand is not None
+    return subcommand
 
 
-def test_the_group_is_found_by_its_entry_point(tsttc: Tsttc) -> None:
+def test_the_group_is_loaded_by_its_entry_point(tsttc: Tsttc) -> None:
     assert re.search(
         r"^  baseline +Run the paper's baselines on frames and boxes\.", tsttc("--help").stdout, re.MULTILINE
     )

@@ -20,7 +20,7 @@ def test_the_list_names_every_method_with_its_parameters(tsttc: Tsttc) -> None:
     text = tsttc("baseline", "list").stdout
     assert "detection  Detection; as published with --measure area." in text
     documents = json.loads(tsttc("baseline", "list", "--json").stdout)
-    assert [found["name"] for found in documents] == [method.name for method in METHODS]
+    assert [document["name"] for document in documents] == [method.name for method in METHODS]
     assert documents[0]["parameters"][0]["choices"] == ["area", "sqrt-area", "height", "width"]
     for method in METHODS:
         assert f"{method.name}  {method.title}; " in text

@@ -28,12 +28,12 @@ def pair(clip: Clip) -> tuple[tuple[Image, Image], tuple[Floats, Floats]]:
 
 
 @pytest.mark.parametrize("scale_ratio", [0.7, 0.95, 1.17])
-def test_a_planted_scale_ratio_is_found_to_a_thousandth(scale_ratio: float) -> None:
-    found = DeepScale(decoding="fit")(planted(scale_ratio), frame_gap=5).scale_ratio
-    assert found == pytest.approx(scale_ratio, rel=1e-3)
+def test_a_planted_scale_ratio_is_recovered_to_a_thousandth(scale_ratio: float) -> None:
+    fitted = DeepScale(decoding="fit")(planted(scale_ratio), frame_gap=5).scale_ratio
+    assert fitted == pytest.approx(scale_ratio, rel=1e-3)
 
 
-def test_small_boxes_are_enlarged_and_their_scale_ratio_is_found() -> None:
+def test_small_boxes_are_enlarged_and_their_scale_ratio_is_recovered() -> None:
     clip = planted(0.95, box_px=(30.0, 24.0), shift=(1.0, -0.6))
     assert DeepScale(decoding="fit")(clip, frame_gap=5).scale_ratio == pytest.approx(0.95, rel=5e-3)
     assert Grid.over(clip.boxes[5], box_px=80.0).pixel_size == pytest.approx(0.5)
@@ -51,12 +51,12 @@ def test_the_card_of_weights_says_how_they_are_decoded() -> None:
 def test_boxes_that_lie_beside_the_vehicle_hardly_change_the_estimate(operations: Operations) -> None:
     frames, boxes = pair(planted(0.95))
     beside = box_around(centre_of(boxes[0]) + np.array([4.0, -3.0]), size_of(boxes[0]))
-    found = fitted_scale_ratio(operations, frames, (beside, boxes[1]), near=0.95)
-    assert found == pytest.approx(0.95, rel=2e-3)
+    fitted = fitted_scale_ratio(operations, frames, (beside, boxes[1]), near=0.95)
+    assert fitted == pytest.approx(0.95, rel=2e-3)
 
 
 def test_without_texture_the_estimate_stays_at_a_start(operations: Operations) -> None:
     _, boxes = pair(planted(0.95))
     grey = np.full((240, 320, 3), 90, dtype=np.uint8)
-    found = fitted_scale_ratio(operations, (grey, grey), boxes, near=0.93)
-    assert min(abs(found - 0.93), abs(found - 0.95)) < 1e-6
+    fitted = fitted_scale_ratio(operations, (grey, grey), boxes, near=0.93)
+    assert min(abs(fitted - 0.93), abs(fitted - 0.95)) < 1e-6

@@ -35,9 +35,9 @@ def test_a_convolution_is_a_sum_of_correlations(size: int, stride: int, shape: t
         sum(correlate2d(image[..., channel], each[channel], mode="same") for channel in range(3))
         for each in weight
     ]
-    found = convolved(image, kernel, np.arange(4, dtype=np.float32), stride=stride)
+    output = convolved(image, kernel, np.arange(4, dtype=np.float32), stride=stride)
     np.testing.assert_allclose(
-        found.transpose(2, 0, 1),
+        output.transpose(2, 0, 1),
         np.array(expected)[:, ::stride, ::stride] + np.arange(4)[:, None, None],
         atol=1e-4,
     )
@@ -59,15 +59,15 @@ def literal_cell(values: Floats, low: float, high: float, cell: int, n_cells: in
     n_samples = int(np.ceil(side / n_cells))
     total = 0.0
     for sample in range(n_samples):
-        place = low + side / n_cells * (cell + (sample + 0.5) / n_samples)
-        if place < -1 or place > len(values):
+        position = low + side / n_cells * (cell + (sample + 0.5) / n_samples)
+        if position < -1 or position > len(values):
             continue
-        place = max(place, 0.0)
-        below = int(place)
+        position = max(position, 0.0)
+        below = int(position)
         if below >= len(values) - 1:
             total += values[-1]
         else:
-            total += values[below] * (below + 1 - place) + values[below + 1] * (place - below)
+            total += values[below] * (below + 1 - position) + values[below + 1] * (position - below)
     return total / n_samples
 
 
@@ -75,8 +75,8 @@ def literal_cell(values: Floats, low: float, high: float, cell: int, n_cells: in
 def test_cells_are_sampled_as_torchvision_samples_them(low: float, high: float) -> None:
     values = RNG.normal(size=12)
     expected = [literal_cell(values, low, high, cell, 5) for cell in range(5)]
-    found = sampling_matrix(low, high, n_cells=5, length=12) @ values
-    np.testing.assert_allclose(found, expected, atol=1e-12)
+    sampled = sampling_matrix(low, high, n_cells=5, length=12) @ values
+    np.testing.assert_allclose(sampled, expected, atol=1e-12)
 
 
 def test_crops_keep_boxes_where_they_are_beyond_the_border_and_shrunk() -> None:

@@ -1,4 +1,4 @@
-"""The toolkit's weights: golden values of their parts, and what they say about real frames."""
+"""The toolkit's weights: golden values of their parts, and their errors on real frames."""
 
 import csv
 import json
@@ -25,12 +25,12 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def shared() -> Path:
     """The folder of shared data with the toolkit's weights."""
-    found = shared_data()
-    if found is None or not (found / "deep-scale" / "Deep_TTC.pth").is_file():
+    folder = shared_data()
+    if folder is None or not (folder / "deep-scale" / "Deep_TTC.pth").is_file():
         pytest.skip(
             "deep-scale is not here: TSTTC_SHARED_DATA names no folder that has the toolkit's weights"
         )
-    return found
+    return folder
 
 
 @pytest.fixture(scope="module")
@@ -50,19 +50,19 @@ def of_noise(layers: NumpyLayers, seed: int) -> Array:
 
 
 def test_the_backbone_gives_the_golden_features(layers: NumpyLayers, golden: Any) -> None:
-    found = of_noise(layers, 0)[0]
+    activations = of_noise(layers, 0)[0]
     for each in golden["backbone"]["values"]:
-        assert found[tuple(each["at"])] == pytest.approx(each["value"], abs=1e-4)
-    assert found.mean() == pytest.approx(golden["backbone"]["mean"], abs=1e-4)
-    assert found.std() == pytest.approx(golden["backbone"]["std"], abs=1e-4)
+        assert activations[tuple(each["at"])] == pytest.approx(each["value"], abs=1e-4)
+    assert activations.mean() == pytest.approx(golden["backbone"]["mean"], abs=1e-4)
+    assert activations.std() == pytest.approx(golden["backbone"]["std"], abs=1e-4)
 
 
 def test_boxes_are_sampled_as_in_the_golden_values(layers: NumpyLayers, golden: Any) -> None:
-    found, roi = of_noise(layers, 0)[0], golden["roi_align"]
+    activations, roi = of_noise(layers, 0)[0], golden["roi_align"]
     for box, expected in zip(roi["boxes"], roi["mean_over_channels"], strict=True):
         columns = sampling_matrix(box[0], box[2], n_cells=roi["out"], length=80)
         rows = sampling_matrix(box[1], box[3], n_cells=roi["out"], length=64)
-        np.testing.assert_allclose((rows @ found @ columns.T).mean(axis=0), expected, atol=1e-5)
+        np.testing.assert_allclose((rows @ activations @ columns.T).mean(axis=0), expected, atol=1e-5)
 
 
 def test_the_head_gives_the_golden_confidences(layers: NumpyLayers, golden: Any) -> None:
@@ -80,9 +80,9 @@ def test_the_head_gives_the_golden_confidences(layers: NumpyLayers, golden: Any)
         reference_shape=(64, 80),
     )
     target, reference = of_noise(layers, 0), of_noise(layers, 1)
-    found = similarities(layers, target, reference, [sampling], similarity="dot")
-    np.testing.assert_allclose(found[0], head["similarity"], atol=1e-3)
-    confidence = 1 / (1 + np.exp(-layers.linear("head.scale_preds", found)))
+    similarity = similarities(layers, target, reference, [sampling], similarity="dot")
+    np.testing.assert_allclose(similarity[0], head["similarity"], atol=1e-3)
+    confidence = 1 / (1 + np.exp(-layers.linear("head.scale_preds", similarity)))
     np.testing.assert_allclose(confidence[0], head["confidence"], atol=1e-4)
 
 
@@ -96,10 +96,10 @@ def test_real_frames_reach_their_errors(
 ) -> None:
     clips, all_ttc_s = real_clips
     rows = range(0, len(clips), 2)  # half of them: neighbours share nine of ten frames
-    found = [deep_scale(clips[row], frame_gap=5).scale_ratio for row in rows]
+    ratios = [deep_scale(clips[row], frame_gap=5).scale_ratio for row in rows]
     sketched = [golden["kitti_clip"]["predictions"][str(row)]["deep_scale_float_boxes"] for row in rows]
-    np.testing.assert_allclose(found, sketched, atol=0.01)
-    ttc_s, true_ttc_s = scale_ratio_to_ttc(found, fps_hz=2.0), all_ttc_s[::2]
+    np.testing.assert_allclose(ratios, sketched, atol=0.01)
+    ttc_s, true_ttc_s = scale_ratio_to_ttc(ratios, fps_hz=2.0), all_ttc_s[::2]
     assert np.mean(MID.errors(ttc_s, true_ttc_s)) <= 12
     assert np.mean(RTE.errors(ttc_s, true_ttc_s)) <= 10.5
 

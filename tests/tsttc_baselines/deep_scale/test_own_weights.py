@@ -1,4 +1,4 @@
-"""The weights that come with the package: what their card says, and what they are good for."""
+"""The weights that come with the package: their card, and their errors on real frames."""
 
 import numpy as np
 import pytest
@@ -30,5 +30,5 @@ def test_on_real_frames_they_reach_the_errors_of_the_toolkits(
     real_clips: tuple[list[Clip], Floats],
 ) -> None:
     clips, ttc_s = real_clips
-    found = [DeepScale()(clip, frame_gap=5).scale_ratio for clip in clips[::2]]
-    assert mean_mid(found, ttc_s[::2]) <= 12
+    ratios = [DeepScale()(clip, frame_gap=5).scale_ratio for clip in clips[::2]]
+    assert mean_mid(ratios, ttc_s[::2]) <= 12

@@ -37,7 +37,7 @@ def test_a_run_names_its_weights(tsttc: Tsttc, folder: Path, weights: Path, tmp_
     assert all(0.65 <= value <= 1.5 for value in document["predictions"].values())
 
 
-def test_faulty_weights_are_said_before_the_folder_is_read(
+def test_faulty_weights_are_refused_before_the_folder_is_read(
     tsttc: Tsttc, folder: Path, tmp_path: Path
 ) -> None:
     path = tmp_path / "c.pth"

@@ -1,4 +1,4 @@
-"""Training: its labels and rates, that it learns, and that an ended one goes on."""
+"""Training: its labels and rates, that it learns, and that an ended one continues."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -47,17 +47,17 @@ def source() -> RenderedSequences:
 
 @pytest.fixture(scope="module")
 def samples(source: RenderedSequences) -> list[Sample]:
-    """All of them, as an epoch has them."""
-    found = list(batches(source, use=SMALL, size=4, rng=np.random.default_rng(0)))
-    assert sum(n_rows for n_rows, _ in found) == 16
-    return [sample for _, batch in found for sample in batch]
+    """All samples of an epoch."""
+    epoch = list(batches(source, use=SMALL, size=4, rng=np.random.default_rng(0)))
+    assert sum(n_rows for n_rows, _ in epoch) == 16
+    return [sample for _, batch in epoch for sample in batch]
 
 
 def test_labels_lie_between_the_two_nearest_scale_ratios(training: Any) -> None:
     scales = np.linspace(0.65, 1.5, 20)
-    found = training.labels([0.65, 0.9, 1.49])
-    np.testing.assert_allclose(found @ scales, [0.65, 0.9, 1.49])
-    assert np.count_nonzero(found, axis=1).tolist() == [1, 2, 2]
+    labels = training.labels([0.65, 0.9, 1.49])
+    np.testing.assert_allclose(labels @ scales, [0.65, 0.9, 1.49])
+    assert np.count_nonzero(labels, axis=1).tolist() == [1, 2, 2]
 
 
 def test_the_rate_warms_up_falls_and_stays_low(training: Any) -> None:
@@ -74,7 +74,7 @@ def test_thirty_steps_halve_the_loss(training: Any, samples: list[Sample]) -> No
 
 
 class Ended(Exception):
-    """What ends a training here."""
+    """Ends a training, as Ctrl-C does."""
 
 
 def end(_epoch: object) -> None:
@@ -96,9 +96,9 @@ def test_an_ended_training_goes_on_as_if_nothing_had_been(
     whole = training.train(**known, out=tmp_path / "whole.npz")
     with pytest.raises(Ended):
         training.train(**known, out=tmp_path / "ended.npz", after_epoch=end)
-    told: list[int] = []
-    ended = training.train(**known, out=tmp_path / "ended.npz", progress=told.append)
-    assert told == [4, 8]
+    reported: list[int] = []
+    ended = training.train(**known, out=tmp_path / "ended.npz", progress=reported.append)
+    assert reported == [4, 8]
     assert [replace(epoch, loss=0) for epoch in ended] == [replace(epoch, loss=0) for epoch in whole]
     one, other = (read_weights(tmp_path / f"{name}.npz") for name in ("whole", "ended"))
     for name, values in one.tensors.items():
@@ -140,9 +140,9 @@ def test_with_a_start_the_score_before_epoch_1_comes_first_and_no_rate_keeps_it(
     recipe = training.Recipe(epochs=1, batch=2, lr_per_pair=1e-12, use=start.use)
     rows = Rows(source)
     known = {"source": rows, "validation": training.Validation(rows), "recipe": recipe, "start": start}
-    told: list[Any] = []
-    epochs = training.train(**known, out=tmp_path / "w.npz", after_epoch=told.append)
-    assert told == epochs
+    reported: list[Any] = []
+    epochs = training.train(**known, out=tmp_path / "w.npz", after_epoch=reported.append)
+    assert reported == epochs
     assert [epoch.number for epoch in epochs] == [0, 1]
     before, after = epochs
     assert (before.loss, before.n_left_out) == (None, 0)

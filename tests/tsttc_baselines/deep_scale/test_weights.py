@@ -1,4 +1,4 @@
-"""Weights come in without torch; nothing in them is run, and what is wrong with them is said."""
+"""Weights are read without torch; nothing in them is run, and every fault is a problem in words."""
 
 import io
 import zipfile
@@ -46,11 +46,11 @@ def test_the_own_file_says_how_to_use_it_and_comes_back_the_same(tmp_path: Path)
     path = tmp_path / "own.npz"
     weights = Weights(TENSORS, Use("cosine", 25, 40.0, 8.0), {"seed": 7})
     write_weights(path, weights)
-    found = read_weights(path)
-    assert same(found, TENSORS)
-    assert (found.use, found.card) == (weights.use, {"seed": 7})
+    read_back = read_weights(path)
+    assert same(read_back, TENSORS)
+    assert (read_back.use, read_back.card) == (weights.use, {"seed": 7})
     again = tmp_path / "again.npz"
-    write_weights(again, found)
+    write_weights(again, read_back)
     assert again.read_bytes() == path.read_bytes()
     with np.load(path, allow_pickle=False) as opened:
         assert opened[LINEAR].tolist() == TENSORS[LINEAR].tolist()
@@ -146,7 +146,7 @@ def own_entries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 def test_a_faulty_own_file_is_a_problem_in_words(
     own_entries: dict[str, bytes], tmp_path: Path, name: str, data: bytes | None, words: str
 ) -> None:
-    entries = {key: found for key, found in own_entries.items() if key != name}
+    entries = {key: content for key, content in own_entries.items() if key != name}
     if data is not None:
         entries[name] = data
     assert words in rejection(written(tmp_path / "own.npz", zipped(entries)))

@@ -34,7 +34,7 @@ def errors(scale_ratios: list[float], anno_ids: list[int]) -> np.ndarray:
 
 
 def test_alignment_that_starts_at_the_truth_stays_there() -> None:
-    found, anno_ids = [], []
+    ratios, anno_ids = [], []
     for sequence in rendered():
         target_box, reference_box = sequence.true_boxes[TARGET], sequence.true_boxes[0]
         if size_of(target_box)[0] <= 60:
@@ -47,13 +47,13 @@ def test_alignment_that_starts_at_the_truth_stays_there() -> None:
             scale_ratio=float(gap_m[TARGET] / gap_m[0]),
             robust=True,
         )
-        found.append(fit.scale_ratio)
+        ratios.append(fit.scale_ratio)
         anno_ids.append(sequence.anno_id)
-    assert len(found) > 20
-    assert np.median(errors(found, anno_ids)) <= 1.5
+    assert len(ratios) > 20
+    assert np.median(errors(ratios, anno_ids)) <= 1.5
 
 
 def test_the_median_error_with_detected_boxes_is_at_most_3_5_mid() -> None:
     align = Alignment()
-    found = [align(sequence.clip, frame_gap=TARGET).scale_ratio for sequence in rendered()]
-    assert np.median(errors(found, list(range(N_SEQUENCES)))) <= 3.5
+    ratios = [align(sequence.clip, frame_gap=TARGET).scale_ratio for sequence in rendered()]
+    assert np.median(errors(ratios, list(range(N_SEQUENCES)))) <= 3.5

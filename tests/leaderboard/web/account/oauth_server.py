@@ -20,7 +20,7 @@ HANGS = object()
 
 @dataclass
 class Provider:
-    """What it answers at each path, and what it was sent."""
+    """Its answers by path, and the requests that it got."""
 
     url: str
     answers: dict[str, Any] = field(default_factory=dict)
@@ -28,7 +28,7 @@ class Provider:
     released: threading.Event = field(default_factory=threading.Event)
 
     def github(self, *, number: int = 42, login: str = "owl", emails: Any = ()) -> None:
-        """Somebody at GitHub, with these addresses: text, verified, primary."""
+        """Answer as GitHub for a person with these addresses: text, verified, primary."""
         rows = [{"email": text, "verified": known, "primary": first} for text, known, first in emails]
         self.answers = {
             "/login/oauth/access_token": {"access_token": TOKEN, "token_type": "bearer"},
@@ -37,7 +37,7 @@ class Provider:
         }
 
     def orcid(self, *, emails: Any = ()) -> None:
-        """Somebody at ORCID, with these public addresses."""
+        """Answer as ORCID for a person with these public addresses."""
         rows = [{"email": text, "verified": known, "primary": first} for text, known, first in emails]
         name = {"given-names": {"value": "An"}, "family-name": {"value": "Owl"}}
         self.answers = {
@@ -63,11 +63,11 @@ def running() -> Iterator[Provider]:
             self._answer()
 
         def _answer(self) -> None:
-            found = provider.answers.get(self.path.partition("?")[0], (404, b"not here"))
-            if found is HANGS:
+            answer = provider.answers.get(self.path.partition("?")[0], (404, b"not here"))
+            if answer is HANGS:
                 provider.released.wait(30)
                 return
-            status, body = found if isinstance(found, tuple) else (200, json.dumps(found).encode())
+            status, body = answer if isinstance(answer, tuple) else (200, json.dumps(answer).encode())
             self.send_response(status)
             self.send_header("Content-Type", "application/json")
             self.send_header("Content-Length", str(len(body)))
@@ -75,7 +75,7 @@ def running() -> Iterator[Provider]:
             self.wfile.write(body)
 
         def log_message(self, *args: object) -> None:
-            """Nobody reads it."""
+            """Keep the log of requests out of the tests' output."""
 
     with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
         provider = Provider(f"http://127.0.0.1:{server.server_port}")
@@ -90,7 +90,7 @@ def running() -> Iterator[Provider]:
 
 
 def lead_to(monkeypatch: pytest.MonkeyPatch, provider: Provider) -> None:
-    """Put this server in the place of the two on the Internet."""
+    """Lead both providers' addresses to this server."""
     monkeypatch.setattr(GitHubOAuth2Adapter, "access_token_url", f"{provider.url}/login/oauth/access_token")
     monkeypatch.setattr(GitHubOAuth2Adapter, "profile_url", f"{provider.url}/user")
     monkeypatch.setattr(GitHubOAuth2Adapter, "emails_url", f"{provider.url}/user/emails")

@@ -12,7 +12,7 @@ CONFIRM = "/accounts/confirm-email/"
 
 
 def proving(settings: Settings) -> None:
-    """What `TSTTC_EMAIL_URL` sets."""
+    """Set what `TSTTC_EMAIL_URL` sets."""
     settings.ACCOUNT_EMAIL_VERIFICATION = "mandatory"
     settings.ACCOUNT_EMAIL_VERIFICATION_BY_CODE_ENABLED = True
     # One mail in ten seconds to one address; no test waits.

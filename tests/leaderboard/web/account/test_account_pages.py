@@ -23,8 +23,8 @@ def test_sign_up_signs_in_and_goes_on_to_submitting(client: Client, edition: Edi
     assert response.status_code == 302
     assert response.headers["Location"] == "/submit/"
     assert User.objects.get(email="new@example.org").name == "Lapwings"
-    said = pages.get(client, "/submit/").one("p", class_="message").text
-    assert said.startswith("Your account is ready, and you are signed in. Next: send a prediction file")
+    message = pages.get(client, "/submit/").one("p", class_="message").text
+    assert message.startswith("Your account is ready, and you are signed in. Next: send a prediction file")
 
 
 def test_sign_up_tells_of_all_that_is_wrong_at_once_and_of_each_rule_once(client: Client, db: None) -> None:
@@ -69,5 +69,5 @@ def test_name_that_would_deceive_is_refused_in_words(client: Client, db: None, n
     response = sign_up(client, name=name)
     assert response.status_code in {200, 422}
     assert not User.objects.exists()
-    said = pages.page(response).one("main").text
-    assert "name" in said or "at most 80 characters" in said, said
+    text = pages.page(response).one("main").text
+    assert "name" in text or "at most 80 characters" in text, text

@@ -65,9 +65,9 @@ def test_a_reset_password_opens_the_account_from_everywhere(owner: User) -> None
 
 
 def link_in(message: Any, path: str) -> str:
-    found = re.search(rf"http://127\.0\.0\.1:8000({path}\S*)", str(message.body))
-    assert found is not None, message.body
-    return found.group(1)
+    match = re.search(rf"http://127\.0\.0\.1:8000({path}\S*)", str(message.body))
+    assert match is not None, message.body
+    return match.group(1)
 
 
 def test_mailed_links_lead_to_the_configured_site_whatever_host_is_asked(

@@ -201,9 +201,9 @@ def test_an_address_that_has_an_account_opens_nothing(
     User.objects.filter(pk=owner.pk).update(last_login=timezone.now())
     provider.github(emails=[(owner.email.upper(), True, True)])
     client = Client()
-    told = arrive(client)
-    assert told.status_code == 409
-    assert "This address has an account" in assert_sound(told).text
+    response = arrive(client)
+    assert response.status_code == 409
+    assert "This address has an account" in assert_sound(response).text
     assert not is_in(client)
     assert not SocialAccount.objects.exists()
     owner.refresh_from_db()
@@ -252,8 +252,10 @@ def test_connecting_needs_a_sign_in_and_the_password_once_more(provider: Provide
     client.post("/accounts/reauthenticate/", {"password": PASSWORD})
     assert SocialAccount.objects.get().user == owner
     assert "GitHub: owl" in assert_sound(client.get("/accounts/3rdparty/")).text
-    told = forgetting.export(user=owner)["connected_accounts"]
-    assert [(row["provider"], row["id"], row["said"]) for row in told] == [("github", "42", {"login": "owl"})]
+    exported = forgetting.export(user=owner)["connected_accounts"]
+    assert [(row["provider"], row["id"], row["said"]) for row in exported] == [
+        ("github", "42", {"login": "owl"})
+    ]
     client.post("/accounts/3rdparty/", {"account": SocialAccount.objects.get().pk})
     assert not SocialAccount.objects.exists()
 
@@ -273,7 +275,7 @@ def test_a_closed_account_stays_closed_and_a_forgotten_person_is_unknown(
 # --- what goes wrong over there --------------------------------------------------------------------------
 
 
-def assert_told(answer: HttpResponse, sentence: str) -> None:
+def assert_refused(answer: HttpResponse, sentence: str) -> None:
     assert answer.status_code == 401
     assert sentence in assert_sound(answer).text
     assert not SocialAccount.objects.exists()
@@ -294,14 +296,14 @@ MALFORMED: tuple[tuple[str, str, Any], ...] = (
 )
 
 
-@pytest.mark.parametrize(("name", "place", "said"), MALFORMED, ids=[str(n) for n in range(len(MALFORMED))])
+@pytest.mark.parametrize(("name", "path", "answer"), MALFORMED, ids=[str(n) for n in range(len(MALFORMED))])
 def test_a_malformed_answer_ends_in_a_sentence(
-    provider: Provider, db: None, name: str, place: str, said: Any
+    provider: Provider, db: None, name: str, path: str, answer: Any
 ) -> None:
     if name == "orcid":
         provider.orcid()
-    provider.answers[place] = said
-    assert_told(arrive(Client(), name), "was not understood")
+    provider.answers[path] = answer
+    assert_refused(arrive(Client(), name), "was not understood")
 
 
 def test_a_provider_that_fails_or_hangs_ends_in_a_sentence(
@@ -309,21 +311,25 @@ def test_a_provider_that_fails_or_hangs_ends_in_a_sentence(
 ) -> None:
     settings.SOCIALACCOUNT_REQUESTS_TIMEOUT = 0.2
     provider.answers["/user"] = (503, b"down")
-    assert_told(arrive(Client()), "The fault is not yours")
+    assert_refused(arrive(Client()), "The fault is not yours")
     provider.answers["/user"] = HANGS
-    assert_told(arrive(Client()), "GitHub did not answer in time.")
+    assert_refused(arrive(Client()), "GitHub did not answer in time.")
 
 
-def test_who_says_no_or_comes_from_nowhere_is_told_so(provider: Provider, client: Client, db: None) -> None:
+def test_who_says_no_or_comes_from_nowhere_gets_a_reason(
+    provider: Provider, client: Client, db: None
+) -> None:
     denied = come_back(client, error="access_denied", state=begin(client))
     assert denied.headers["Location"] == "/accounts/3rdparty/login/cancelled/"
     assert "You cancelled" in assert_sound(client.get(denied.headers["Location"])).text
-    assert_told(come_back(client, error="server_error", state=begin(client)), "GitHub refused the sign-in.")
+    assert_refused(
+        come_back(client, error="server_error", state=begin(client)), "GitHub refused the sign-in."
+    )
     state = begin(client)
     for asked in ({}, {"code": CODE}, {"code": CODE, "state": "x" * 5000}, {"state": state, "code": "\x00"}):
         assert come_back(client, **asked).status_code in {302, 401}
     # A state is good once, in the browser that began.
-    assert_told(come_back(client, code=CODE, state=state), "Start the sign-in again.")
-    assert_told(come_back(Client(), code=CODE, state=begin(client)), "Start the sign-in again.")
+    assert_refused(come_back(client, code=CODE, state=state), "Start the sign-in again.")
+    assert_refused(come_back(Client(), code=CODE, state=begin(client)), "Start the sign-in again.")
     assert assert_sound(client.get("/accounts/3rdparty/signup/", follow=True))
     assert client.get("/accounts/3rdparty/login/error/").status_code == 401

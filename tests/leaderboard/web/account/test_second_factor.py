@@ -125,7 +125,7 @@ HOME, ATTACKER = "198.51.100.7", "203.0.113.9"
 
 
 def tries(user: User, code: str, *, address: str) -> bool:
-    """Whether this code, sent from this address by somebody who knows the password, opens the account."""
+    """Whether this code, sent from this address by a person who knows the password, opens the account."""
     client = Client(REMOTE_ADDR=address)
     sign_in(client, user)
     return client.post("/accounts/2fa/authenticate/", {"code": code}).status_code == 302
@@ -154,7 +154,7 @@ def test_guesses_of_codes_from_many_addresses_meet_the_limit_of_the_account(
     assert tries(owner, phone.code(), address=HOME)
 
 
-def test_codes_can_be_made_anew_and_the_app_removed_after_the_password(
+def test_codes_can_be_renewed_and_the_app_removed_after_the_password(
     owner: User, phone: Phone, django_capture_on_commit_callbacks: DjangoCaptureOnCommitCallbacks
 ) -> None:
     client = signed_in(owner)
@@ -162,9 +162,9 @@ def test_codes_can_be_made_anew_and_the_app_removed_after_the_password(
         codes = set_up(client, phone)
         assert_sound(client.get("/accounts/2fa/recovery-codes/generate/"))
         client.post("/accounts/2fa/recovery-codes/generate/")
-    anew = re.findall(r"<code>(\d{8})</code>", client.get("/accounts/2fa/recovery-codes/").text)
-    assert len(anew) == 10
-    assert not set(anew) & set(codes)
+    renewed = re.findall(r"<code>(\d{8})</code>", client.get("/accounts/2fa/recovery-codes/").text)
+    assert len(renewed) == 10
+    assert not set(renewed) & set(codes)
     # In another session the password is not enough: with a second factor, a code confirms.
     other = Client()
     sign_in(other, owner)
@@ -177,8 +177,8 @@ def test_codes_can_be_made_anew_and_the_app_removed_after_the_password(
     assert other.get("/accounts/2fa/recovery-codes/").status_code == 302
     assert_sound(client.get("/accounts/2fa/totp/deactivate/"))
     client.post("/accounts/2fa/totp/deactivate/")
-    told = [message.subject.partition("] ")[2] for message in mail.outbox]
-    assert told == [
+    subjects = [message.subject.partition("] ")[2] for message in mail.outbox]
+    assert subjects == [
         *("You have a second factor", "You have new recovery codes", "Your second factor was removed")
     ]
     assert not Authenticator.objects.exists()
@@ -339,15 +339,15 @@ def test_a_maintainer_resets_the_second_factor_of_another_with_a_reason(owner: U
 
 
 @pytest.mark.parametrize(
-    ("email", "reason", "said"),
+    ("email", "reason", "message"),
     [
         ("nobody@example.org", "lost", "no account with that address"),
         ("owner@example.org", " ", "'reason' is empty"),
         ("owner@example.org", "lost", "has no second factor"),
     ],
 )
-def test_what_cannot_be_reset_is_said(owner: User, email: str, reason: str, said: str) -> None:
-    with pytest.raises(CommandError, match=said):
+def test_what_cannot_be_reset_has_a_message(owner: User, email: str, reason: str, message: str) -> None:
+    with pytest.raises(CommandError, match=message):
         call_command("reset_second_factor", email.replace("owner@example.org", owner.email), reason=reason)
     assert not AuditEvent.objects.filter(verb="second factor reset").exists()
 
@@ -356,9 +356,9 @@ def test_the_export_names_the_second_factor_without_its_key_and_forgetting_delet
     owner: User, phone: Phone
 ) -> None:
     codes = set_up(signed_in(owner), phone)
-    told = forgetting.export(user=owner)["second_factor"]
-    assert [row["type"] for row in told] == ["recovery_codes", "totp"]
-    assert not [secret for secret in (phone.key, *codes) if secret in str(told)]
+    exported = forgetting.export(user=owner)["second_factor"]
+    assert [row["type"] for row in exported] == ["recovery_codes", "totp"]
+    assert not [secret for secret in (phone.key, *codes) if secret in str(exported)]
     assert not [message for message in mail.outbox if phone.key in message.body]
     forgetting.forget(user=owner, reason="asked", actor=owner, now=timezone.now())
     assert not Authenticator.objects.exists()

@@ -61,7 +61,7 @@ def test_the_list_tells_name_use_and_end(signed_in: Client, benchmark: None) -> 
 
 
 @pytest.mark.parametrize(
-    ("fields", "field", "said"),
+    ("fields", "field", "sentence"),
     [
         ({"name": ""}, "name", "The token has no name"),
         ({"scopes": []}, "scopes", "The token has no scope"),
@@ -70,11 +70,11 @@ def test_the_list_tells_name_use_and_end(signed_in: Client, benchmark: None) -> 
     ],
 )
 def test_what_is_wrong_stands_at_its_field(
-    signed_in: Client, benchmark: None, fields: dict[str, object], field: str, said: str
+    signed_in: Client, benchmark: None, fields: dict[str, object], field: str, sentence: str
 ) -> None:
     response = signed_in.post(PAGE, {**FIELDS, **fields})
     assert response.status_code == 422
-    assert said in assert_sound(response).one("div", id=f"id_{field}_error").text
+    assert sentence in assert_sound(response).one("div", id=f"id_{field}_error").text
     assert not ApiToken.objects.exists()
 
 

@@ -1,4 +1,4 @@
-"""An address that somebody has not proved takes nothing from its owner."""
+"""An address that another account has not proved takes nothing from its owner."""
 
 import subprocess
 import sys
@@ -36,7 +36,7 @@ def _proving(db: None, settings: Settings) -> None:
 
 @pytest.fixture
 def attacker() -> Client:
-    """Somebody with a proved address of their own."""
+    """A signed-in user with a proved address of their own."""
     client = Client()
     sign_up(client, "attacker@example.org", password=EVIL)
     assert prove(client).headers["Location"] == "/submit/"
@@ -59,16 +59,16 @@ def test_with_a_mail_server_addresses_are_proved_by_a_code(production: dict[str,
     assert printed.stdout.split() == ["mandatory", "True"], printed.stderr
 
 
-# --- an address that somebody adds to their account ------------------------------------------------------
+# --- an address that a user adds to their account ---------------------------------------------------------
 
 
-def test_an_address_that_somebody_else_added_is_free_for_its_owner(attacker: Client) -> None:
+def test_an_address_that_another_account_added_is_free_for_its_owner(attacker: Client) -> None:
     added = attacker.post("/accounts/email/", {"action_add": "", "email": VICTIM})
     assert added.headers["Location"] == CONFIRM
     assert not EmailAddress.objects.filter(email=VICTIM).exists(), "nothing is kept before it is proved"
-    [told] = mail.outbox
-    assert told.to == [VICTIM]
-    assert "The account attacker@example.org of" in told.body
+    [code_mail] = mail.outbox
+    assert code_mail.to == [VICTIM]
+    assert "The account attacker@example.org of" in code_mail.body
     page = assert_sound(attacker.get(CONFIRM)).one("main").text
     assert "belongs to the account attacker@example.org" in page
 
@@ -77,17 +77,17 @@ def test_an_address_that_somebody_else_added_is_free_for_its_owner(attacker: Cli
     assert subjects() == ["Confirm your email address"] * 2
     # The mails tell the two apart, and the attacker's code is worth nothing on the owner's page.
     assert "Somebody signed up at" in mail.outbox[1].body
-    assert "The code is wrong" in victim.post(CONFIRM, {"code": code_in(told)}).text
+    assert "The code is wrong" in victim.post(CONFIRM, {"code": code_in(code_mail)}).text
     assert prove(victim).headers["Location"] == "/submit/"
     assert victim.get("/submissions/").status_code == 200
     assert signs_in(VICTIM, PASSWORD)
     assert not signs_in(VICTIM, EVIL)
     # Nor does the attacker's code prove it any more, should they learn it.
-    assert attacker.post(CONFIRM, {"code": code_in(told)}).status_code == 200
+    assert attacker.post(CONFIRM, {"code": code_in(code_mail)}).status_code == 200
     assert EmailAddress.objects.get(email=VICTIM).user.email == VICTIM
 
 
-# --- an account that somebody signed up with it ----------------------------------------------------------
+# --- an account that a person signed up with it ----------------------------------------------------------
 
 
 def test_an_account_that_nobody_confirmed_gives_way_to_the_owners(attacker: Client) -> None:
@@ -123,7 +123,7 @@ def test_who_is_displaced_before_proving_signs_up_once_more() -> None:
 
 
 def test_a_reset_password_opens_no_account_that_nobody_confirmed() -> None:
-    """Whoever made it may have another way in: an account elsewhere that is connected with it."""
+    """The person who made it may have another way in: an account elsewhere that is connected with it."""
     sign_up(Client(), VICTIM, password=EVIL)
     SocialAccount.objects.create(user=User.objects.get(email=VICTIM), provider="github", uid="666")
     Client().post("/accounts/password/reset/", {"email": VICTIM})
@@ -134,7 +134,7 @@ def test_a_reset_password_opens_no_account_that_nobody_confirmed() -> None:
     assert not SocialAccount.objects.exists()
 
 
-def test_adding_an_address_that_somebody_signed_up_with_proves_it(attacker: Client) -> None:
+def test_adding_an_address_that_another_signed_up_with_proves_it(attacker: Client) -> None:
     sign_up(Client(), VICTIM, password=EVIL)
     client = Client()
     sign_up(client, "owner@example.org")

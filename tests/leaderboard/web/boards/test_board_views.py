@@ -93,10 +93,10 @@ def test_filters_and_search_show_what_fits_and_keep_the_ranks(
         ("q=shi", {row for row in everything if "published" in row}),
     ):
         root = get(client, f"/board/test/?{query}")
-        found = pages.board_rows(root)
-        assert len(found) == len(expected), query
-        assert all(everything[row[1]] == row[0] for row in found)
-        assert f"{len(found)} of {len(everything)} results" in root.one("main").text
+        matches = pages.board_rows(root)
+        assert len(matches) == len(expected), query
+        assert all(everything[row[1]] == row[0] for row in matches)
+        assert f"{len(matches)} of {len(everything)} results" in root.one("main").text
 
 
 def test_filters_that_nothing_fits_leave_a_sentence_and_a_way_back(
@@ -110,7 +110,7 @@ def test_filters_that_nothing_fits_leave_a_sentence_and_a_way_back(
 
 
 @pytest.mark.parametrize(
-    ("query", "said"),
+    ("query", "sentence"),
     [
         ("columns=all", "The board has no columns 'all'; expected one of both, mid, rte."),
         ("page=0", "The board has no page '0'; expected a number from 1 on."),
@@ -120,10 +120,10 @@ def test_filters_that_nothing_fits_leave_a_sentence_and_a_way_back(
         ("frames=9", "The filter 'frames' is '9'; expected one of 2, 3, 4, 5, 6."),
     ],
 )
-def test_malformed_views_are_a_clear_400(client: Client, benchmark: None, query: str, said: str) -> None:
+def test_malformed_views_are_a_clear_400(client: Client, benchmark: None, query: str, sentence: str) -> None:
     response = client.get(f"/board/test/?{query}")
     assert response.status_code == 400
-    assert said in pages.page(response).one("main").text
+    assert sentence in pages.page(response).one("main").text
 
 
 def test_long_boards_come_in_pages(

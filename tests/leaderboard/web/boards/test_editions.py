@@ -53,17 +53,17 @@ def test_former_edition_keeps_its_board_and_names_its_successor(
 
 def test_edition_names_its_ground_truth_protocol_counts_and_time(client: Client, replaced: Edition) -> None:
     truth = replaced.ground_truth
-    said = facts(get(client, NEW))
-    assert said["Ground truth"] == truth.digest
-    assert said["Manifest"] == truth.manifest_digest
-    assert said["Protocol"] == "tsttc-1"
+    shown = facts(get(client, NEW))
+    assert shown["Ground truth"] == truth.digest
+    assert shown["Manifest"] == truth.manifest_digest
+    assert shown["Protocol"] == "tsttc-1"
     counts = truth.counts
-    assert said["Sequences"] == (
+    assert shown["Sequences"] == (
         f"120 in 24 recordings: crucial {counts['crucial']}, small {counts['small']}, "
         f"large {counts['large']}, negative {counts['negative']}, out of range {counts['out_of_range']}"
     )
-    assert said["Changed"] == "5 labels corrected, compared with edition 1"
-    assert said["Published"].endswith("UTC: Labels corrected.")
+    assert shown["Changed"] == "5 labels corrected, compared with edition 1"
+    assert shown["Published"].endswith("UTC: Labels corrected.")
 
 
 def test_edition_that_was_taken_back_says_so_and_keeps_its_board(client: Client, replaced: Edition) -> None:

@@ -29,7 +29,7 @@ def rows(client: Client, chart: str) -> list[list[str]]:
 
 
 def options_of(figure: pages.Element) -> Any:
-    """What the script draws, as ECharts takes it."""
+    """Return the options that the script draws, as ECharts takes them."""
     return json.loads(figure.one("script").raw_text)["baseOption"]
 
 
@@ -47,17 +47,17 @@ def test_every_chart_has_its_options_and_the_table_with_the_same_numbers(
     for figure in root.all("figure"):
         assert figure.one("div", class_="drawing").attributes["role"] == "img"
         assert figure.one("div", class_="drawing").attributes["aria-label"].endswith(".")
-        told = read_numbers(options_of(figure))
-        assert told
+        numbers = read_numbers(options_of(figure))
+        assert numbers
         shown = {number for cell in figure.all("td") for number in NUMBER.findall(cell.text)}
-        assert told <= shown, figure.attributes["data-chart"]
+        assert numbers <= shown, figure.attributes["data-chart"]
 
 
 NUMBER = re.compile(r"\d+\.\d+")
 
 
 def read_numbers(options: Any) -> set[str]:
-    """Every number with a point that a reader of the marks is told."""
+    """Return every number with a point in the lines that marks show to a reader."""
     lines = [
         line
         for series in options["series"]
@@ -89,9 +89,9 @@ def test_the_front_is_what_nothing_beats_in_both(client: Client, entries: list[S
     for latency_ms, entry in zip((40.0, 3.0, 12.0, 1.0), entries, strict=True):
         Method.objects.filter(pk=entry.method_id).update(latency_ms=latency_ms, hardware="one GPU")
     builders.board_changed("test")
-    found = rows(client, "latency")
-    points = [(float(row[2]), float(row[4])) for row in found]
-    front = [point for point, row in zip(points, found, strict=True) if row[5] == "yes"]
+    latency_rows = rows(client, "latency")
+    points = [(float(row[2]), float(row[4])) for row in latency_rows]
+    front = [point for point, row in zip(points, latency_rows, strict=True) if row[5] == "yes"]
     assert front == [p for p in points if not any(q != p and q[0] <= p[0] and q[1] <= p[1] for q in points)]
 
 
@@ -124,15 +124,15 @@ def compared(entries: list[Submission], edition: Edition) -> list[Submission]:
     return entries
 
 
-def test_first_rows_are_compared_once_somebody_looks(client: Client, compared: list[Submission]) -> None:
+def test_first_rows_are_compared_once_the_page_is_read(client: Client, compared: list[Submission]) -> None:
     assert Comparison.objects.count() == 0
     assert {row[2] for row in rows(client, "significance")} == {"being computed"}
     n_pairs = len(compared) * (len(compared) - 1) // 2
     assert Comparison.objects.filter(computed_at=None).count() == n_pairs
     builders.infer_all()
-    found = rows(client, "significance")
-    assert len(found) == n_pairs
-    assert all(float(row[2].replace("−", "-")) <= 0 for row in found)
+    pair_rows = rows(client, "significance")
+    assert len(pair_rows) == n_pairs
+    assert all(float(row[2].replace("−", "-")) <= 0 for row in pair_rows)
     client.get("/board/test/charts/")
     assert Comparison.objects.count() == n_pairs
 
@@ -140,12 +140,12 @@ def test_first_rows_are_compared_once_somebody_looks(client: Client, compared: l
 def test_resolution_of_each_column_stands_once_below_the_pairs(
     client: Client, compared: list[Submission]
 ) -> None:
-    def said() -> list[str]:
+    def resolutions() -> list[str]:
         return [part.text for part in pages.page(client.get("/board/test/charts/")).all("p", id="resolution")]
 
-    assert said() == [], "nothing is known yet"
+    assert resolutions() == [], "nothing is known yet"
     builders.infer_all()
-    (text,) = said()
+    (text,) = resolutions()
     assert "(medians of 3 pairs)" in text
 
 

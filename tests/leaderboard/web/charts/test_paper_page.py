@@ -20,11 +20,11 @@ def test_the_page_has_every_value_and_marks_the_defaults(client: Client) -> None
     tables = root.all("table")
     assert len(tables) == 12
     for shown, drawn in zip(printed_tables(), tables, strict=True):
-        found = [
+        texts = [
             [cell.text.removesuffix(" (default)") for cell in row.all("th") + row.all("td")]
             for row in drawn.all("tr")
         ]
-        assert found == [
+        assert texts == [
             [heading or "Name" for heading in shown.headings],
             *(list(row.cells) for row in shown.rows),
         ]
@@ -44,8 +44,8 @@ def test_sweeps_have_a_chart_with_every_number_of_their_table() -> None:
     drawn = [mark["value"][1] for each in gap if each["type"] == "scatter" for mark in each["data"]]
     rows = published_tables().table("ablation-frame-gap").rows
     assert sorted(drawn) == sorted(value for row in rows for value in row.values)
-    told = [mark["read"] for each in gap if each["type"] == "scatter" for mark in each["data"]]
-    assert ["MiD 41.0", "the paper's default"] in told
+    lines = [mark["read"] for each in gap if each["type"] == "scatter" for mark in each["data"]]
+    assert ["MiD 41.0", "the paper's default"] in lines
 
 
 def test_tables_are_downloaded_and_the_api_has_their_numbers(client: Client) -> None:
@@ -55,9 +55,9 @@ def test_tables_are_downloaded_and_the_api_has_their_numbers(client: Client) -> 
         assert answer["Content-Disposition"].endswith(f'"tsttc-paper-ablation-frame-gap.{suffix}"')
     for address in ("/published/nowhere.csv", "/published/ablation-frame-gap.bib"):
         assert client.get(address).status_code == 404
-    found = json.loads(client.get("/api/v1/published/ablation-frame-gap").content)
-    assert found["rows"][4]["values"] == [41.0, 29.9]
-    assert found["rows"][4]["is_default"]
+    document = json.loads(client.get("/api/v1/published/ablation-frame-gap").content)
+    assert document["rows"][4]["values"] == [41.0, 29.9]
+    assert document["rows"][4]["is_default"]
     assert len(json.loads(client.get("/api/v1/published").content)) == 12
 
 

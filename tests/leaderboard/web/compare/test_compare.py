@@ -84,14 +84,14 @@ def test_every_bad_question_has_a_page_that_says_what_is_wrong(
 ) -> None:
     secret = builders.submit(owner, b"{}", method="Secret", visibility="PRIVATE")
     ids = [entry.method_id for entry in entries]
-    for methods, split, status, said in (
+    for methods, split, status, sentence in (
         (["x", ids[0]], "test", 404, "There is no method 'x'; expected an identifier"),
         ([ids[0], secret.method_id], "test", 404, "that you may see"),
         ([ids[0]], "test", 400, "A comparison needs 2 to 5 methods; found 1."),
         (ids[:2], "nowhere", 404, "There is no split 'nowhere'; expected one of test, val, demo."),
     ):
         root = get(client, *methods, split=split, status=status)
-        assert said in root.one("p", class_="notice").text, (said, words(root))
+        assert sentence in root.one("p", class_="notice").text, (sentence, words(root))
         assert root.all("svg", class_="whisker") == []
 
 
@@ -100,12 +100,12 @@ def test_without_methods_it_offers_those_of_the_board(client: Client, entries: l
     offered = [box.attributes["value"] for box in root.all("input", type="checkbox")]
     assert offered == [str(entry.method_id) for entry in entries]
     # As many decimals as the edition publishes: the test split's have one.
-    said = [choice.text for choice in root.all("label", class_="choice")]
-    assert all(re.search(r"MiD\s\d+\.\d$", text.strip()) for text in said), said
+    choices = [choice.text for choice in root.all("label", class_="choice")]
+    assert all(re.search(r"MiD\s\d+\.\d$", text.strip()) for text in choices), choices
     assert "No method has a score on demo yet." in words(get(client, split="demo"))
 
 
-def test_too_few_recordings_are_said_and_no_p_is_shown(
+def test_too_few_recordings_are_named_and_no_p_is_shown(
     client: Client, benchmark: None, owner: User, tmp_path: pytest.TempPathFactory
 ) -> None:
     edition = builders.import_truth(tmp_path, n_recordings=7)
@@ -132,12 +132,12 @@ def test_the_page_says_on_how_few_recordings_the_difference_rests(
     ids = [entries[0].method_id, entries[1].method_id]
     get(client, *ids)
     builders.infer_all()
-    said = get(client, *ids).one("p", class_="influence").text
+    sentence = get(client, *ids).one("p", class_="influence").text
     assert re.fullmatch(
         r"Without the \d+ of \d+ recordings that favour M1.05 most, the difference would not be significant"
         r"(; without \d+, it would have the other sign)?\.",
-        said,
-    ), said
+        sentence,
+    ), sentence
 
 
 def test_of_a_hidden_split_nobody_learns_on_how_few_recordings_a_difference_rests(
@@ -153,10 +153,10 @@ def test_of_a_hidden_split_nobody_learns_on_how_few_recordings_a_difference_rest
     assert "(95 % confidence interval: " in root.one("p", class_="verdict").text
     assert root.all("p", class_="influence") == []
     (kept,) = Comparison.objects.values_list("differences", flat=True)
-    assert {found["influence"] for found in kept.values()} == {None}
+    assert {difference["influence"] for difference in kept.values()} == {None}
 
 
-def test_what_was_chosen_of_several_submissions_is_said_and_what_that_is_worth(
+def test_what_was_chosen_of_several_submissions_is_shown_and_what_that_is_worth(
     client: Client, entries: list[Submission], edition: Edition, owner: User
 ) -> None:
     ids = [entries[0].method_id, entries[1].method_id]
@@ -168,12 +168,12 @@ def test_what_was_chosen_of_several_submissions_is_said_and_what_that_is_worth(
         builders.submit(owner, builders.predictions(edition, factor=factor), method=name)
     builders.score_all()
     builders.infer_all()
-    said = (
+    sentence = (
         f"{name} is the best of 3 scored submissions: the best of 3 equally good variants looks better than "
         "it is by about 0.60 standard errors of the difference of two of them."
     )
-    assert get(client, *ids).one("p", class_="selection").text == said
+    assert get(client, *ids).one("p", class_="selection").text == sentence
     method_page = pages.page(client.get(f"/methods/{ids[0]}/"))
-    assert method_page.one("p", class_="selection").text == said
+    assert method_page.one("p", class_="selection").text == sentence
     other = pages.page(client.get(f"/methods/{ids[1]}/"))
     assert other.all("p", class_="selection") == []

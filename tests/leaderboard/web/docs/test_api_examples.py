@@ -120,7 +120,7 @@ def test_every_operation_has_a_page_with_a_request_an_answer_and_an_error(
 def test_the_command_of_an_example_is_one_that_tsttc_knows(name: str) -> None:
     program, command, *arguments = shlex.split(EXAMPLES[name].command)
     assert program == "tsttc"
-    found = main.get_command(click.Context(main), command)
-    assert found is not None, command
-    options = {option for parameter in found.params for option in parameter.opts}
+    click_command = main.get_command(click.Context(main), command)
+    assert click_command is not None, command
+    options = {option for parameter in click_command.params for option in parameter.opts}
     assert {argument for argument in arguments if argument.startswith("--")} <= options

@@ -63,18 +63,20 @@ def test_every_field_and_parameter_is_on_the_page_with_its_description(
     undescribed = []
     for section, fields in described():
         # On the page of an operation its parameters come before the fields of its objects.
-        place = (
+        element = (
             root.one("section", **{"aria-labelledby": section})
             if section.startswith("shape-")
             else operation_page(client, section).one("section", class_="parameters")
         )
-        shown = {cells[0].text: cells[2].text for row in place.all("tr") if len(cells := row.all("td")) == 3}
+        shown = {
+            cells[0].text: cells[2].text for row in element.all("tr") if len(cells := row.all("td")) == 3
+        }
         undescribed += [f"{section}: {name}" for name, about in fields.items() if shown.get(name) != about]
     assert undescribed == []
 
 
-def test_every_code_has_a_place_that_errors_lead_to(client: Client, benchmark: None) -> None:
+def test_every_code_has_an_anchor_that_errors_lead_to(client: Client, benchmark: None) -> None:
     ids = {e.attributes["id"] for e in get(client).everything() if "id" in e.attributes}
     assert {f"problem-{code}" for code in (*API_CODES, *PROBLEM_CODES)} <= ids
-    said = client.get("/api/v1/nowhere").json()
-    assert said["type"].partition("#")[2] in ids
+    problem = client.get("/api/v1/nowhere").json()
+    assert problem["type"].partition("#")[2] in ids

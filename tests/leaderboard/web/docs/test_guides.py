@@ -36,7 +36,7 @@ def test_every_page_of_the_documentation_has_the_navigation_and_marks_where_one_
         } <= listed
 
 
-def test_the_address_of_a_guide_without_its_slash_leads_to_it_and_others_are_not_found(
+def test_the_address_of_a_guide_without_its_slash_leads_to_it_and_others_are_404(
     client: Client, benchmark: None
 ) -> None:
     assert client.get("/docs/researchers").headers["Location"] == "/docs/researchers/"
@@ -57,8 +57,8 @@ def test_a_guide_asks_the_database_for_nothing_and_is_compressed(
 # --- search ----------------------------------------------------------------------------------------------
 
 
-def found(client: Client, query: str) -> list[tuple[str, str]]:
-    """Address and text of each place that the search page shows."""
+def search_hits(client: Client, query: str) -> list[tuple[str, str]]:
+    """Return address and text of each hit on the search page."""
     root = assert_sound(client.get("/docs/search/", {"q": query}, follow=True))
     items = [li for hits in root.all("ol", class_="hits") for li in hits.all("li")]
     return [(li.one("a").attributes["href"], li.text) for li in items]
@@ -78,8 +78,8 @@ def found(client: Client, query: str) -> list[tuple[str, str]]:
 def test_what_people_look_for_is_among_the_first_five(
     client: Client, benchmark: None, query: str, address: str
 ) -> None:
-    first = [place for place, _ in found(client, query)[:5]]
-    assert any(place.startswith(address) for place in first), first
+    first = [href for href, _ in search_hits(client, query)[:5]]
+    assert any(href.startswith(address) for href in first), first
 
 
 def test_the_words_asked_for_are_marked_and_are_never_markup(client: Client, benchmark: None) -> None:

@@ -84,7 +84,7 @@ def test_the_wheel_installs_into_an_empty_environment_and_prints_its_version(
     ]
     subprocess.run([*pip, "install", "--quiet", "--no-deps", "--no-index", str(wheel)], check=True)
     environment = os.environ | {"PYTHONPATH": get_path("purelib")}
-    said = subprocess.run(
+    version = subprocess.run(
         [home / "bin" / "tsttc", "--version"],
         env=environment,
         cwd=tmp_path,
@@ -92,9 +92,9 @@ def test_the_wheel_installs_into_an_empty_environment_and_prints_its_version(
         text=True,
         check=True,
     )
-    assert said.stdout == f"tsttc {dist.name.split('-')[1]}\n"
+    assert version.stdout == f"tsttc {dist.name.split('-')[1]}\n"
     script = "import evaluator; print(evaluator.__file__)"
-    place = subprocess.run(
+    location = subprocess.run(
         [home / "bin" / "python", "-c", script],
         env=environment,
         cwd=tmp_path,
@@ -102,7 +102,7 @@ def test_the_wheel_installs_into_an_empty_environment_and_prints_its_version(
         text=True,
         check=True,
     )
-    assert Path(place.stdout.strip()).is_relative_to(home)
+    assert Path(location.stdout.strip()).is_relative_to(home)
 
 
 def test_without_a_wheel_the_page_says_so_in_words(client: Client, benchmark: None, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What crawlers are told: what to leave alone, and every public page and no other."""
+"""What crawlers get: what to leave alone, and every public page and no other."""
 
 import re
 from xml.etree import ElementTree as ET
@@ -19,9 +19,9 @@ LOC = "{http://www.sitemaps.org/schemas/sitemap/0.9}loc"
 def listed(client: Client) -> list[str]:
     answer = client.get("/sitemap.xml")
     assert answer["Content-Type"] == "application/xml; charset=utf-8"
-    found = [each.text or "" for each in ET.fromstring(answer.content).iter(LOC)]
-    assert all(address.startswith(settings.SITE_URL) for address in found)
-    return [address.removeprefix(settings.SITE_URL) for address in found]
+    addresses = [each.text or "" for each in ET.fromstring(answer.content).iter(LOC)]
+    assert all(address.startswith(settings.SITE_URL) for address in addresses)
+    return [address.removeprefix(settings.SITE_URL) for address in addresses]
 
 
 @pytest.mark.slow
@@ -30,11 +30,11 @@ def test_the_sitemap_names_public_pages_and_each_answers(
 ) -> None:
     sent = builders.submit(owner, builders.predictions(edition), method="Public")
     builders.score_all()
-    found = listed(client)
-    assert len(found) == len(set(found))
-    assert {"/", "/board/test/", "/board/val/charts/", "/board/test/editions/1/", "/docs/"} <= set(found)
-    assert f"/methods/{sent.method_id}/" in found
-    assert [address for address in found if client.get(address).status_code != 200] == []
+    addresses = listed(client)
+    assert len(addresses) == len(set(addresses))
+    assert {"/", "/board/test/", "/board/val/charts/", "/board/test/editions/1/", "/docs/"} <= set(addresses)
+    assert f"/methods/{sent.method_id}/" in addresses
+    assert [address for address in addresses if client.get(address).status_code != 200] == []
 
 
 def test_the_sitemap_names_no_private_anonymous_or_withdrawn_method(
@@ -48,7 +48,7 @@ def test_the_sitemap_names_no_private_anonymous_or_withdrawn_method(
     assert [address for address in listed(client) if "/methods/" in address] == []
 
 
-def test_robots_are_told_of_the_sitemap_and_kept_from_ones_own_pages(client: Client, benchmark: None) -> None:
+def test_robots_get_the_sitemap_and_are_kept_from_ones_own_pages(client: Client, benchmark: None) -> None:
     answer = client.get("/robots.txt")
     assert answer["Content-Type"] == "text/plain; charset=utf-8"
     lines = answer.content.decode().splitlines()

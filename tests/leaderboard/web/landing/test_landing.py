@@ -104,9 +104,9 @@ def test_dates_are_the_splits_and_for_the_signed_in_what_their_team_has_left(
     closing = f"Submissions to test close at {closes_at:%Y-%m-%d %H:%M} UTC."
     assert closing in panel(client, "boards").text
     client.force_login(owner)
-    told = panel(client, "boards").text
-    assert closing in told
-    assert "2 of 2" in told
+    text = panel(client, "boards").text
+    assert closing in text
+    assert "2 of 2" in text
 
 
 def test_news_are_editions_and_entries_the_newest_first(
@@ -117,10 +117,10 @@ def test_news_are_editions_and_entries_the_newest_first(
     links = [a.text for a in panel(client, "news").one("ol").all("a")]
     assert links[:2] == ["Test, edition 1", "Test, edition 2"]
     assert links[2:] == [f"M{factor}" for factor in (1.4, 1.2, 1.1)]
-    told = panel(client, "news").text
-    assert "current again: edition 2 was rolled back" in told
-    assert "replaced edition 1: " in told
-    assert "by Owls, rank " in told
+    text = panel(client, "news").text
+    assert "current again: edition 2 was rolled back" in text
+    assert "replaced edition 1: " in text
+    assert "by Owls, rank " in text
 
 
 def test_news_name_an_anonymous_method_by_its_pseudonym(
@@ -128,17 +128,21 @@ def test_news_name_an_anonymous_method_by_its_pseudonym(
 ) -> None:
     sent = builders.submit(owner, builders.predictions(edition), method="Shy", visibility="ANONYMOUS")
     builders.score_all()
-    told = panel(client, "news").text
-    assert sent.method.pseudonym in told
+    text = panel(client, "news").text
+    assert sent.method.pseudonym in text
     assert not {"Shy", "Owls"} & set(landing(client).text.split())
 
 
 # --- for search engines ----------------------------------------------------------------------------------
 
 
-def test_search_engines_are_told_what_the_dataset_is(client: Client, benchmark: None) -> None:
+def test_search_engines_learn_what_the_dataset_is(client: Client, benchmark: None) -> None:
     (script,) = pages.get(client, "/").all("script", type="application/ld+json")
-    told = json.loads(script.raw_text)
-    assert (told["@context"], told["@type"], told["name"]) == ("https://schema.org", "Dataset", "TSTTC")
-    assert told["creator"][0] == {"@type": "Person", "name": "Yuheng Shi"}
-    assert "Test, Validation, Demo" in told["description"]
+    dataset = json.loads(script.raw_text)
+    assert (dataset["@context"], dataset["@type"], dataset["name"]) == (
+        "https://schema.org",
+        "Dataset",
+        "TSTTC",
+    )
+    assert dataset["creator"][0] == {"@type": "Person", "name": "Yuheng Shi"}
+    assert "Test, Validation, Demo" in dataset["description"]

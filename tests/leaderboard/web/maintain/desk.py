@@ -16,7 +16,7 @@ def get(client: Client, address: str) -> pages.Element:
     return assert_sound(response)
 
 
-def said(client: Client, address: str) -> str:
+def main_text(client: Client, address: str) -> str:
     return get(client, address).one("main").text
 
 
@@ -27,7 +27,7 @@ def board_number() -> int:
 
 
 def refusal(client: Client, address: str, data: dict[str, object]) -> str:
-    """What a form says that was refused; nothing is the board but the first edition."""
+    """Return the errors of a refused form; the board stays at its edition."""
     before = board_number()
     response = client.post(address, data)
     assert response.status_code == 422

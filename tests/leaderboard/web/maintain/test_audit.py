@@ -110,8 +110,8 @@ def test_the_page_has_the_beginning_of_a_digest_and_the_export_has_all_of_it(
 ) -> None:
     digest = f"sha256:{'0123456789abcdef' * 4}"
     audit.record(verb="v", noun="n", noun_id="1", actor=owner, details={"report_digest": digest})
-    [[*_, told, _]] = rows(keeper.get(PAGE))
-    assert told == "report_digest: sha256:01234567…"
+    [[*_, details, _]] = rows(keeper.get(PAGE))
+    assert details == "report_digest: sha256:01234567…"
     assert digest in text_of(keeper.get(JSON))
 
 

@@ -20,7 +20,7 @@ from leaderboard.models import (
 )
 from tests import builders, pages
 from tests.editions import extended, open_edition, publish
-from tests.leaderboard.web.maintain.desk import FIRST, HUB, OPEN, SECOND, get, said, totals
+from tests.leaderboard.web.maintain.desk import FIRST, HUB, OPEN, SECOND, get, main_text, totals
 
 pytestmark = pytest.mark.slow
 
@@ -65,15 +65,15 @@ def test_desk_shows_each_split_with_its_board_and_what_is_prepared(keeper: Clien
 def test_desk_leads_to_what_failed_by_our_fault(keeper: Client, rescored: Edition) -> None:
     Evaluation.objects.filter(edition=rescored).update(status=Status.SYSTEM_ERROR)
     link = next(a for a in get(keeper, HUB).all("a") if a.text == "inspect and retry")
-    assert "4 evaluations in edition 2: inspect and retry" in said(keeper, HUB)
+    assert "4 evaluations in edition 2: inspect and retry" in main_text(keeper, HUB)
     listed = get(keeper, link.attributes["href"])
     assert len(listed.one("table", class_="queue").one("tbody").all("tr")) == 4
 
 
 def test_pages_offer_only_what_can_be_done_to_an_edition(keeper: Client, rescored: Edition) -> None:
     for page in (HUB, FIRST):
-        assert "Roll back" not in said(keeper, page)
-    assert "Edition 1 is not in preparation" in said(keeper, f"{FIRST}discard/")
+        assert "Roll back" not in main_text(keeper, page)
+    assert "Edition 1 is not in preparation" in main_text(keeper, f"{FIRST}discard/")
     assert get(keeper, f"{SECOND}discard/").one("main").all("button")
     current = get(keeper, f"{FIRST}publish/").one("main")
     assert "Edition 1 is the current board already, so it cannot be published." in current.text
@@ -81,7 +81,7 @@ def test_pages_offer_only_what_can_be_done_to_an_edition(keeper: Client, rescore
     assert get(keeper, f"{SECOND}publish/").one("main").all("button")
     publish(rescored)
     for page in (HUB, SECOND):
-        assert "Roll back to edition 1" in said(keeper, page)
+        assert "Roll back to edition 1" in main_text(keeper, page)
 
 
 # --- progress --------------------------------------------------------------------------------------------
@@ -91,7 +91,7 @@ def poll(client: Client, query: str = "") -> HttpResponseBase:
     return client.get(f"{SECOND}progress/{query}")
 
 
-def test_progress_is_told_when_it_changes_and_ends_with_the_comparison(
+def test_progress_is_sent_when_it_changes_and_ends_with_the_comparison(
     keeper: Client, second: Edition
 ) -> None:
     assert poll(keeper).status_code == 200
@@ -109,7 +109,7 @@ def test_progress_is_told_when_it_changes_and_ends_with_the_comparison(
 
 
 def test_comparison_is_the_previews_line_by_line(keeper: Client, rescored: Edition) -> None:
-    found = preview.preview(rescored)
+    expected = preview.preview(rescored)
     root = get(keeper, SECOND)
     assert totals(root) == {
         "sequences added": "0",
@@ -117,13 +117,13 @@ def test_comparison_is_the_previews_line_by_line(keeper: Client, rescored: Editi
         "labels changed": "5",
         "anno_id changed": "0",
         "entries": "4",
-        "entries changed": str(found.n_changed),
-        "ranks changed": str(found.n_moved),
+        "entries changed": str(expected.n_changed),
+        "ranks changed": str(expected.n_moved),
         "newly rejected": "0",
     }
     rows = root.one("table", class_="changes").one("tbody").all("tr")
-    assert [row.one("th").one("a").text for row in rows] == [change.method for change in found.changes]
-    for row, change in zip(rows, found.changes, strict=True):
+    assert [row.one("th").one("a").text for row in rows] == [change.method for change in expected.changes]
+    for row, change in zip(rows, expected.changes, strict=True):
         cells = row.all("td")
         assert cells[-1].text == "scored"
         for cell, name in zip(cells[1:-1], SCORE_NAMES, strict=True):
@@ -150,7 +150,7 @@ def test_entries_that_become_rejected_say_why(
         assert "expected a new file" in status.one("p").text
         assert status.text.startswith("rejected, was scored")
         assert "worse" in status.classes
-    listed = said(keeper, f"{SECOND}publish/")
+    listed = main_text(keeper, f"{SECOND}publish/")
     assert (
         "4 scored entries cannot be scored in this edition, and stay marked in edition 1: M1.05 (Owls)"
         in listed

@@ -24,7 +24,7 @@ from leaderboard.ops import health
 from leaderboard.web.maintain import queue_tables
 from tests import pages
 from tests.leaderboard.web.maintain import queue_rows
-from tests.leaderboard.web.maintain.desk import get, said
+from tests.leaderboard.web.maintain.desk import get, main_text
 from tests.leaderboard.web.test_every_page import assert_sound
 
 pytestmark = pytest.mark.slow
@@ -60,7 +60,7 @@ def counts(root: pages.Element) -> list[str]:
 
 
 def rows(root: pages.Element, heading: str) -> list[list[str]]:
-    """One of the lists as texts; none where a sentence stands instead."""
+    """Return the rows of one list as texts; none where there is a sentence instead."""
     [section] = [each for each in root.all("section") if each.one("h2").text.startswith(heading)]
     tables = section.all("tbody")
     return [[cell.text for cell in row.all("td")] for row in tables[0].all("tr")] if tables else []
@@ -134,13 +134,13 @@ def test_rows_say_what_makes_them_matter_less(keeper: Client, failed: Evaluation
 
 def test_page_says_that_nobody_looks_after_the_queue(keeper: Client, edition: Edition) -> None:
     gone = "There was no sweep in the last 60 s: every worker is gone."
-    assert gone in said(keeper, QUEUE)
+    assert gone in main_text(keeper, QUEUE)
     health.record_sweep(n_out_of_reach=2)
-    found = said(keeper, QUEUE)
-    assert gone not in found
-    assert "2 waiting evaluations need a ground truth that the worker of the last sweep" in found
+    text = main_text(keeper, QUEUE)
+    assert gone not in text
+    assert "2 waiting evaluations need a ground truth that the worker of the last sweep" in text
     SweepBeat.objects.update(swept_at=timezone.now() - timedelta(seconds=61))
-    assert gone in said(keeper, QUEUE)
+    assert gone in main_text(keeper, QUEUE)
 
 
 # --- one list, page by page ------------------------------------------------------------------------------
@@ -179,7 +179,9 @@ def test_lists_are_chosen_by_state_and_by_split(keeper: Client, all_three: objec
 
 
 @pytest.mark.parametrize("query", ["state=nothing", "split=nowhere", "state=%00"])
-def test_what_cannot_be_asked_for_is_said_at_its_field(keeper: Client, edition: Edition, query: str) -> None:
+def test_what_cannot_be_asked_for_has_a_reason_at_its_field(
+    keeper: Client, edition: Edition, query: str
+) -> None:
     answer = keeper.get(f"{QUEUE}?{query}")
     assert answer.status_code == 400
     assert "There is no such" in assert_sound(answer).one("div", class_="wrong").text
@@ -193,7 +195,7 @@ def seen(root: pages.Element) -> str:
     return root.one("input", id="queue-seen").attributes["value"]
 
 
-def test_waiting_page_is_told_what_is_new_and_nothing_else(
+def test_waiting_page_gets_what_is_new_and_nothing_else(
     keeper: Client, edition: Edition, owner: User
 ) -> None:
     health.record_sweep()
@@ -241,7 +243,9 @@ def test_buttons_send_what_they_stand_beside_and_come_back_to_the_same_list(
     assert "2 evaluations queued again." in pages.page(answer).one("main").text
 
 
-def test_what_was_retried_meanwhile_is_said_and_not_retried_twice(keeper: Client, failed: Evaluation) -> None:
+def test_what_was_retried_meanwhile_has_a_reason_and_is_not_retried_twice(
+    keeper: Client, failed: Evaluation
+) -> None:
     retry(keeper, failed)
     again = pages.page(retry(keeper, failed)).one("main").text
     assert "there is nothing to retry" in again

@@ -9,7 +9,7 @@ from pytest_django.fixtures import Settings
 from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, Submission, Team, User
 from leaderboard.people import teams
 from tests import builders, pages
-from tests.leaderboard.web.maintain.desk import get, said
+from tests.leaderboard.web.maintain.desk import get, main_text
 from tests.leaderboard.web.test_every_page import assert_sound
 
 pytestmark = pytest.mark.slow
@@ -64,16 +64,16 @@ def address(team: Team, *parts: str) -> str:
 def cells(root: pages.Element, label: str) -> list[list[str]]:
     """The rows of the table in the region of this name, without what is only spoken."""
     [region] = [div for div in root.all("div", role="region") if div.attributes["aria-label"] == label]
-    return [[told(cell) for cell in row.all("td")] for row in region.one("tbody").all("tr")]
+    return [[visible_text(cell) for cell in row.all("td")] for row in region.one("tbody").all("tr")]
 
 
-def told(cell: pages.Element) -> str:
+def visible_text(cell: pages.Element) -> str:
     spoken = " ".join(each.text for each in cell.all("span", class_="spoken"))
     return cell.text.removesuffix(spoken).strip()
 
 
 def wrong(client: Client, where: str, data: dict[str, str]) -> list[str]:
-    """What a refused form says at its fields."""
+    """Return the errors of a refused form at its fields."""
     answer = client.post(where, data)
     assert answer.status_code == 422
     root = assert_sound(answer)
@@ -105,17 +105,17 @@ def test_overrides_say_whose_why_by_whom_and_since_when(keeper: Client, override
 
 
 def test_pages_say_that_quotas_are_off(keeper: Client, team: Team, settings: Settings) -> None:
-    assert "switched off" not in said(keeper, QUOTAS)
+    assert "switched off" not in main_text(keeper, QUOTAS)
     settings.QUOTAS = False
-    assert "switched off" in said(keeper, QUOTAS)
-    assert "switched off" in said(keeper, address(team))
+    assert "switched off" in main_text(keeper, QUOTAS)
+    assert "switched off" in main_text(keeper, address(team))
 
 
 # --- looking up a team -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("text", ["OWL", "0wls", "teammate@example"])
-def test_team_is_found_by_name_by_look_and_by_its_people(
+def test_team_is_listed_by_name_by_look_and_by_its_people(
     keeper: Client, team: Team, teammate: User, stranger: User, text: str
 ) -> None:
     teams.team_of(user=stranger)
@@ -125,7 +125,7 @@ def test_team_is_found_by_name_by_look_and_by_its_people(
 
 
 @pytest.mark.parametrize("text", ["x" * 255, "\0"])
-def test_what_cannot_be_looked_up_is_said_at_its_field(keeper: Client, team: Team, text: str) -> None:
+def test_what_cannot_be_looked_up_has_a_reason_at_its_field(keeper: Client, team: Team, text: str) -> None:
     answer = keeper.get(QUOTAS, {"team": text})
     assert answer.status_code == 400
     assert assert_sound(answer).one("div", class_="wrong").one("div", class_="errors").text
@@ -195,11 +195,11 @@ def test_override_is_set_for_its_team_on_its_split_and_on_the_record(
         ("reason", " ", "No reason was given"),
     ],
 )
-def test_what_is_wrong_is_said_at_its_field_and_changes_nothing(
+def test_what_is_wrong_has_a_reason_at_its_field_and_changes_nothing(
     keeper: Client, team: Team, field: str, text: str, sentence: str
 ) -> None:
-    [said_there] = wrong(keeper, address(team, "test"), {**RULES, field: text})
-    assert sentence in said_there
+    [message] = wrong(keeper, address(team, "test"), {**RULES, field: text})
+    assert sentence in message
     assert not QuotaOverride.objects.exists()
     assert not AuditEvent.objects.filter(verb="quota_overridden").exists()
 
@@ -208,7 +208,7 @@ def test_override_ends_with_a_reason_and_on_the_record(
     keeper: Client, team: Team, override: QuotaOverride, maintainer: User
 ) -> None:
     end = address(team, "test", "end")
-    page = said(keeper, end)
+    page = main_text(keeper, end)
     assert RULES_OF_TEST in page
     assert "5 submissions within 36 hours" in page
     assert wrong(keeper, end, {"reason": ""}) == [

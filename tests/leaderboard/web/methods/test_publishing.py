@@ -21,8 +21,8 @@ from tests.leaderboard.web.maintain.desk import (
     SECOND,
     board_number,
     get,
+    main_text,
     refusal,
-    said,
     totals,
 )
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -98,7 +98,7 @@ def test_publishing_makes_it_the_board_with_the_reason(
     publication = Publication.objects.first()
     assert publication is not None
     assert (publication.reason, publication.by) == ("Five labels were wrong.", maintainer)
-    assert "Five labels were wrong." in said(keeper, "/board/test/editions/")
+    assert "Five labels were wrong." in main_text(keeper, "/board/test/editions/")
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_publishing_makes_it_the_board_with_the_reason(
         ({"replaces": "one", "reason": "x"}, "reload the page"),
     ],
 )
-def test_what_the_form_lacks_is_said_and_nothing_changes(
+def test_what_the_form_lacks_is_named_and_nothing_changes(
     keeper: Client, rescored: Edition, data: dict[str, object], words: str
 ) -> None:
     assert words in refusal(keeper, f"{SECOND}publish/", data)
@@ -127,7 +127,7 @@ def test_unfinished_submissions_are_listed_and_left_out_only_knowingly(
     assert "4 submissions are neither scored nor rejected" in sentence
     assert keeper.post(f"{SECOND}publish/", {**data, "leave_out": "on"}).status_code == 302
     assert board_number() == 2
-    assert "4 submissions were left out." in said(keeper, "/board/test/editions/")
+    assert "4 submissions were left out." in main_text(keeper, "/board/test/editions/")
 
 
 def test_rolling_back_returns_the_board_as_it_was(
@@ -140,17 +140,17 @@ def test_rolling_back_returns_the_board_as_it_was(
     assert root.one("input", name="replaces").attributes["value"] == "2"
     response = keeper.post(f"{SECOND}roll-back/", {"reason": "A mistake.", "replaces": 2}, follow=True)
     assert pages.board_rows(pages.page(response)) == before
-    assert "Rolled back from edition 2 to edition 1. A mistake." in said(keeper, "/board/test/editions/")
+    assert "Rolled back from edition 2 to edition 1. A mistake." in main_text(keeper, "/board/test/editions/")
 
 
 def test_giving_up_ends_a_preparation_and_its_work(keeper: Client, second: Edition, maintainer: User) -> None:
-    assert "4 queued evaluations are cancelled" in said(keeper, f"{SECOND}discard/")
+    assert "4 queued evaluations are cancelled" in main_text(keeper, f"{SECOND}discard/")
     response = keeper.post(f"{SECOND}discard/", {"reason": "The wrong file."}, follow=True)
     assert response.redirect_chain == [(HUB, 302)]
     assert "No draft edition." in assert_sound(response).one("main").text
     event = AuditEvent.objects.filter(verb="discarded").get()
     assert (event.actor, event.details["reason"]) == (maintainer, "The wrong file.")
     assert builders.score_all() == 0
-    assert "discarded" in said(keeper, SECOND)
-    assert "Publish" not in said(keeper, SECOND)
+    assert "discarded" in main_text(keeper, SECOND)
+    assert "Publish" not in main_text(keeper, SECOND)
     assert "was discarded" in refusal(keeper, f"{SECOND}publish/", {"reason": "x", "replaces": 1})

@@ -1,4 +1,4 @@
-"""What everybody is answered from the cache: nothing that an address, a host or a reader adds to it."""
+"""Answers from the cache contain nothing that an address, a host or a reader adds."""
 
 from typing import Any
 
@@ -85,14 +85,14 @@ def test_what_is_kept_is_answered_under_our_names_alone(
         assert client.get(page, headers={"Host": "rebound.example.org"}).status_code == 400
 
 
-@pytest.mark.parametrize("place", ["/x", "//evil.example"])
+@pytest.mark.parametrize("prefix", ["/x", "//evil.example"])
 def test_what_says_that_the_site_is_elsewhere_changes_no_answer(
-    place: str, filled: list[Method], client: Client
+    prefix: str, filled: list[Method], client: Client
 ) -> None:
     queries = ("", "?sort=-mid&nerf=no", "?frames=6")
     for address in (*PAGES, *(f"/board/test/{query}" for query in queries)):
         # As a server hands it on that believes such a header of its proxy.
-        first = client.get(address, SCRIPT_NAME=place)
+        first = client.get(address, SCRIPT_NAME=prefix)
         assert first.status_code == 200
         kept = client.get(address).content
         assert first.content == kept, address

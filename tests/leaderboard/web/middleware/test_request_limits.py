@@ -32,8 +32,10 @@ def test_one_page_too_many_is_refused_in_words_with_a_time_and_a_way_back(
 ) -> None:
     settings.SITE_URL = "http://testserver"
     client = signed_in(owner)
-    found = [client.post("/tokens/", {"name": f"token {n}", "scope": "read"}).status_code for n in range(3)]
-    assert 429 not in found
+    statuses = [
+        client.post("/tokens/", {"name": f"token {n}", "scope": "read"}).status_code for n in range(3)
+    ]
+    assert 429 not in statuses
     refused = client.post("/tokens/", {"name": "one too many"}, HTTP_REFERER="http://testserver/tokens/?a=b")
     assert refused.status_code == 429
     assert 1 <= int(refused.headers["Retry-After"]) <= 3600
@@ -58,17 +60,17 @@ def test_an_account_is_counted_wherever_it_sends_from_and_no_other_with_it(
     owner: User, stranger: User
 ) -> None:
     client = signed_in(owner)
-    found = [client.post("/tokens/", {}, REMOTE_ADDR=f"192.0.2.{n}").status_code for n in range(4)]
-    assert found[-1] == 429
-    assert 429 not in found[:3]
+    statuses = [client.post("/tokens/", {}, REMOTE_ADDR=f"192.0.2.{n}").status_code for n in range(4)]
+    assert statuses[-1] == 429
+    assert 429 not in statuses[:3]
     assert signed_in(stranger).post("/tokens/", {}).status_code != 429
 
 
 def test_boards_answered_from_memory_are_not_counted_and_others_are(edition: Edition) -> None:
     visitor = Client(REMOTE_ADDR=ATTACKER)
     assert {visitor.get("/board/test/").status_code for _ in range(10)} == {200}
-    found = [visitor.get(f"/board/test/?q={n}").status_code for n in range(5)]
-    assert found == [200, 200, 429, 429, 429]
+    statuses = [visitor.get(f"/board/test/?q={n}").status_code for n in range(5)]
+    assert statuses == [200, 200, 429, 429, 429]
     assert Client(REMOTE_ADDR=ELSEWHERE).get("/board/test/?q=1").status_code == 200
     # What is remembered goes on being answered.
     assert visitor.get("/board/test/").status_code == 200

@@ -1,4 +1,4 @@
-"""The list of one's own submissions: what stands in it, search, filters, pages, and links both ways."""
+"""The list of one's own submissions: what is in it, search, filters, pages, and links both ways."""
 
 import pytest
 from django.test import Client
@@ -53,7 +53,7 @@ def test_number_of_queries_does_not_grow_with_the_list(
 
 
 @pytest.mark.parametrize(
-    ("asked", "found"),
+    ("asked", "expected"),
     [
         ({"q": "NIGHT"}, ["Second try"]),
         ({"q": "v2.json"}, ["First try"]),
@@ -65,7 +65,7 @@ def test_number_of_queries_does_not_grow_with_the_list(
     ],
 )
 def test_list_is_searched_and_filtered(
-    signed_in: Client, edition: Edition, owner: User, asked: dict[str, str], found: list[str]
+    signed_in: Client, edition: Edition, owner: User, asked: dict[str, str], expected: list[str]
 ) -> None:
     good = [builders.predictions(edition, factor=factor) for factor in (1.1, 1.2)]
     builders.submit(owner, good[0], method="First try", filename="v2.json")
@@ -74,8 +74,8 @@ def test_list_is_searched_and_filtered(
     builders.score_all()
     main = pages.page(signed_in.get("/submissions/", asked)).one("main")
     named = [row.all("td")[1].one("a").text for body in main.all("tbody") for row in body.all("tr")]
-    assert named == found
-    if not found:
+    assert named == expected
+    if not expected:
         assert "No submission matches." in main.text
 
 

@@ -1,4 +1,4 @@
-"""What a submission's page says beyond the numbers: rank, what is beside it, a row for a paper, its cost."""
+"""What a submission's page says beyond the numbers: rank, comparison, a row for a paper, its cost."""
 
 import pytest
 from django.db import connection
@@ -27,7 +27,7 @@ def look(client: Client, submission: Submission) -> pages.Element:
     return pages.page(client.get(PAGE.format(submission.pk)))
 
 
-def standing(root: pages.Element) -> str:
+def rank_sentence(root: pages.Element) -> str:
     return root.one("p", class_="standing").text
 
 
@@ -48,11 +48,11 @@ def mid(submission: Submission) -> float:
 
 def test_rank_is_the_boards_with_its_range(signed_in: Client, inferred: list[Submission]) -> None:
     [row] = [row for row in board_now().entries if row.submission_id == inferred[1].pk]
-    found = row.intervals["mid"]
+    interval = row.intervals["mid"]
     n_ranked = sum(row.rank is not None for row in board_now().entries)
-    ends = {found.rank_low, found.rank_high}
+    ends = {interval.rank_low, interval.rank_high}
     within = "–".join(str(end) for end in sorted(end for end in ends if end is not None))
-    assert standing(look(signed_in, inferred[1])).startswith(
+    assert rank_sentence(look(signed_in, inferred[1])).startswith(
         f"Rank {row.rank} ({within}) of {n_ranked} on test. In brackets: 95 % confidence range of the rank."
     )
 
@@ -62,7 +62,7 @@ def test_maintainer_reads_the_same_rank_of_a_private_one(
 ) -> None:
     sent = builders.submit(owner, builders.predictions(edition, factor=1.01), visibility="PRIVATE")
     builders.score_all()
-    assert "If published: rank 1 of" in standing(look(keeper, sent))
+    assert "If published: rank 1 of" in rank_sentence(look(keeper, sent))
 
 
 @pytest.mark.parametrize("visibility", ["PUBLIC", "PRIVATE"])
@@ -74,8 +74,8 @@ def test_what_another_submission_of_the_method_surpasses_has_no_rank(
         for factor in (1.2, 1.1)
     )
     builders.score_all()
-    assert standing(look(signed_in, worse)).startswith("Not the best: the board shows another")
-    assert "rank" in standing(look(signed_in, better)).lower()
+    assert rank_sentence(look(signed_in, worse)).startswith("Not the best: the board shows another")
+    assert "rank" in rank_sentence(look(signed_in, better)).lower()
 
 
 def test_what_may_be_the_best_is_marked_as_on_the_board(

@@ -51,7 +51,7 @@ def strike_out(submission: Submission) -> None:
         )
 
 
-def test_waiting_submission_says_its_place_and_keeps_asking(
+def test_waiting_submission_shows_its_position_and_keeps_asking(
     signed_in: Client, submission: Submission
 ) -> None:
     root = get(signed_in, PAGE, submission)
@@ -99,12 +99,12 @@ def test_polling_goes_on_from_the_result_to_its_intervals_and_stops_there(
 
 
 def intervals(root: pages.Element) -> list[str]:
-    """What stands below those of the ten values that have enough recordings."""
+    """Return the intervals of those of the ten values that have enough recordings."""
     return [cell.text for cell in root.all("td", class_="span") if cell.text != "–"]
 
 
 def stops(client: Client, submission: Submission) -> str:
-    """What a page says whose polling has come to its end, from whatever state it was in."""
+    """Return the text of a page whose polling has ended."""
     assert client.get(STATE.format(submission.pk), {"seen": "SCORED"}).status_code == 286
     root = get(client, PAGE, submission)
     assert "hx-get" not in root.one("div", id="state").attributes
@@ -143,7 +143,9 @@ def test_result_has_the_papers_columns_the_counts_and_the_truncations(
     assert "1 sequence in no TTC range counts in the overall scores only" in root.one("main").text
 
 
-def test_problems_are_numbered_with_place_and_total(signed_in: Client, edition: Edition, owner: User) -> None:
+def test_problems_are_numbered_with_position_and_total(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
     bad = builders.submit(owner, b'{"0": 0, "1": "fast", "zz": 1}')
     builders.score_all()
     root = get(signed_in, PAGE, bad)
@@ -166,7 +168,7 @@ def test_our_own_failure_is_called_ours(signed_in: Client, submission: Submissio
     assert "your quota is not used" in root.one("main").text
 
 
-def test_one_that_waits_far_too_long_is_told_so_and_that_nothing_is_lost(
+def test_one_that_waits_far_too_long_says_so_and_that_nothing_is_lost(
     signed_in: Client, submission: Submission
 ) -> None:
     before = get(signed_in, PAGE, submission).one("input", name="seen").attributes["value"]
@@ -178,7 +180,7 @@ def test_one_that_waits_far_too_long_is_told_so_and_that_nothing_is_lost(
     assert "nothing is lost" in current_step(get(signed_in, PAGE, submission))
 
 
-def test_of_a_re_scored_submission_both_runs_are_told_with_their_dates(
+def test_of_a_re_scored_submission_both_runs_are_shown_with_their_dates(
     signed_in: Client, submission: Submission, tmp_path: Path
 ) -> None:
     builders.score_all()

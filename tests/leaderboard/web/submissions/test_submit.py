@@ -68,7 +68,7 @@ def test_own_teams_methods_are_offered_and_nobody_elses(
 
 
 @pytest.mark.parametrize(
-    ("visibility", "said"),
+    ("visibility", "sentence"),
     [
         ("PRIVATE", ""),
         ("ANONYMOUS", "Mine is anonymous: everyone sees its results on every split, under the name "),
@@ -76,20 +76,20 @@ def test_own_teams_methods_are_offered_and_nobody_elses(
     ],
 )
 def test_page_and_api_say_who_will_see_the_result_before_anything_is_sent(
-    signed_in: Client, edition: Edition, owner: User, visibility: str, said: str
+    signed_in: Client, edition: Edition, owner: User, visibility: str, sentence: str
 ) -> None:
     sent = builders.submit(owner, builders.predictions(edition), method="Mine", visibility=visibility)
-    told = pages.page(signed_in.get("/submit/")).one("div", id="notices").text
-    assert (said in told, bool(told)) == (True, bool(said))
+    notices = pages.page(signed_in.get("/submit/")).one("div", id="notices").text
+    assert (sentence in notices, bool(notices)) == (True, bool(sentence))
     [method] = signed_in.get("/api/v1/methods").json()
     answer = signed_in.get(f"/api/v1/submissions/{sent.pk}").json()
-    assert method["notice"] == answer["notice"] == told
+    assert method["notice"] == answer["notice"] == notices
     builders.submit(owner, builders.predictions(edition), method="Another")
     refused = pages.page(send(signed_in, None, method="Mine"))
-    assert refused.one("div", id="notices").text == told
+    assert refused.one("div", id="notices").text == notices
 
 
-def test_who_sees_a_method_is_told_to_its_own_team_alone(
+def test_who_sees_a_method_is_shown_to_its_own_team_alone(
     client: Client, edition: Edition, owner: User, stranger: User
 ) -> None:
     made = builders.submit(owner, builders.predictions(edition), method="Mine").method
@@ -122,9 +122,9 @@ def test_the_template_has_every_anno_id_and_is_rejected_until_it_is_filled_in(
 ) -> None:
     answer = client.get("/submit/template/test.json")
     manifest = manifests.load(edition.ground_truth.manifest_digest)
-    found = json.loads(answer.content)
-    assert list(found) == list(manifest.anno_id_keys)
-    assert set(found.values()) == {None}
+    template = json.loads(answer.content)
+    assert list(template) == list(manifest.anno_id_keys)
+    assert set(template.values()) == {None}
     with pytest.raises(evaluator.Rejected) as rejected:
         evaluator.read_predictions(answer.content, manifest=manifest)
     assert {problem.code for problem in rejected.value.problems} == {"not-a-number"}
@@ -136,8 +136,8 @@ def test_the_template_has_every_anno_id_and_is_rejected_until_it_is_filled_in(
 def test_details_of_the_method_are_taken_with_the_file_in_words_of_people(
     signed_in: Client, edition: Edition
 ) -> None:
-    said = {"n_parameters": "25M", "latency_ms": "50", "hardware": "one GPU", "uses_nerf": "no"}
-    response = send(signed_in, builders.predictions(edition), note="second try", **said)
+    details = {"n_parameters": "25M", "latency_ms": "50", "hardware": "one GPU", "uses_nerf": "no"}
+    response = send(signed_in, builders.predictions(edition), note="second try", **details)
     assert response.status_code == 302
     sent = Submission.objects.select_related("method").get()
     method = sent.method
@@ -149,7 +149,7 @@ def test_details_of_the_method_are_taken_with_the_file_in_words_of_people(
     assert (method.n_parameters, method.hardware) == (31_000_000, "one GPU")
 
 
-def test_a_script_that_follows_the_upload_is_told_where_the_submission_is(
+def test_a_script_that_follows_the_upload_gets_the_address_of_the_submission(
     signed_in: Client, edition: Edition
 ) -> None:
     file = SimpleUploadedFile("p.json", builders.predictions(edition), "application/json")
@@ -180,7 +180,7 @@ def test_every_missing_field_is_named_at_once(signed_in: Client, edition: Editio
 
 
 @pytest.mark.parametrize(
-    ("field", "value", "said"),
+    ("field", "value", "sentence"),
     [
         ("split", "nowhere", "There is no split 'nowhere'"),
         ("method", "x" * 81, "has 81 characters; expected at most 80"),
@@ -188,10 +188,10 @@ def test_every_missing_field_is_named_at_once(signed_in: Client, edition: Editio
     ],
 )
 def test_refusals_stand_at_their_field(
-    signed_in: Client, edition: Edition, field: str, value: str, said: str
+    signed_in: Client, edition: Edition, field: str, value: str, sentence: str
 ) -> None:
     response = send(signed_in, builders.predictions(edition), **{field: value})
-    assert said in error_at(response, field)
+    assert sentence in error_at(response, field)
     assert not Submission.objects.exists()
 
 

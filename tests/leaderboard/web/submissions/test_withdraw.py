@@ -1,4 +1,4 @@
-"""What a team finds on its submission: that its board was corrected, and how to withdraw."""
+"""A team sees on its submission that the board was corrected, and how to withdraw."""
 
 from pathlib import Path
 
@@ -41,7 +41,7 @@ def notices(client: Client, submission: Submission) -> list[str]:
 # --- the board was corrected -------------------------------------------------------------------------------
 
 
-def test_team_is_told_what_a_correction_did_to_its_entry(
+def test_team_sees_what_a_correction_did_to_its_entry(
     signed_in: Client, sent: Submission, tmp_path: Path
 ) -> None:
     second = open_edition(corrected(tmp_path, factor=1.3))
@@ -54,7 +54,7 @@ def test_team_is_told_what_a_correction_did_to_its_entry(
     ]
 
 
-def test_team_is_told_that_a_correction_was_taken_back(
+def test_team_sees_that_a_correction_was_taken_back(
     signed_in: Client, sent: Submission, tmp_path: Path
 ) -> None:
     publish(open_edition(corrected(tmp_path, factor=1.3)), leave_out=True)
@@ -64,7 +64,7 @@ def test_team_is_told_that_a_correction_was_taken_back(
     assert notice.startswith(f"Rolled back to edition 1 on {changed_on()}: A mistake. MiD {mid(sent, 2)} → ")
 
 
-def test_team_is_told_that_the_new_truth_cannot_score_its_file(
+def test_team_sees_that_the_new_truth_cannot_score_its_file(
     signed_in: Client, sent: Submission, tmp_path: Path
 ) -> None:
     second = open_edition(extended(tmp_path))
@@ -87,7 +87,7 @@ def test_team_is_told_that_the_new_truth_cannot_score_its_file(
         (Status.CANCELLED, "The new edition leaves this file out."),
     ],
 )
-def test_team_is_told_when_its_file_is_not_scored_in_the_new_edition(
+def test_team_sees_when_its_file_is_not_scored_in_the_new_edition(
     signed_in: Client, sent: Submission, tmp_path: Path, status: Status, words: str
 ) -> None:
     second = open_edition(corrected(tmp_path, factor=1.3))
@@ -110,7 +110,7 @@ def test_page_says_what_withdrawing_does_and_that_it_stays_done(signed_in: Clien
     assert sent.withdrawn_at is None
 
 
-def test_team_withdraws_and_is_told_when(client: Client, sent: Submission, teammate: User) -> None:
+def test_team_withdraws_and_sees_when(client: Client, sent: Submission, teammate: User) -> None:
     client.force_login(teammate)
     response = client.post(address(sent, "withdraw/"), follow=True)
     assert response.redirect_chain == [(address(sent), 302)]
@@ -126,7 +126,7 @@ def test_what_waits_or_failed_is_cancelled_in_words_of_its_own(
     failed = builders.submit(owner, builders.predictions(edition), method="Failed")
     queue_rows.strike_out()
     waiting = builders.submit(owner, builders.predictions(edition), method="Waiting")
-    for submission, words, told in (
+    for submission, words, verb in (
         (failed, "it failed by an error on our side and has no values", "withdrawn"),
         (waiting, "It is cancelled and not scored", "cancelled"),
     ):
@@ -134,7 +134,7 @@ def test_what_waits_or_failed_is_cancelled_in_words_of_its_own(
         assert words in main.text
         assert "Its values leave the board" not in main.text
         done = signed_in.post(address(submission, "withdraw/"), follow=True)
-        assert f"The submission is {told}." in pages.page(done).one("div", class_="messages").text
+        assert f"The submission is {verb}." in pages.page(done).one("div", class_="messages").text
 
 
 def test_withdrawing_twice_is_withdrawing_once(signed_in: Client, sent: Submission) -> None:
