@@ -47,11 +47,11 @@ except ServiceMissing as missing:
 
 def judged(line: str) -> str:
     """A line that a benchmark printed, with the goal of its figure and whether it holds."""
-    found = _LINE.match(line)
-    if found is None or found[1] not in GOALS:
+    match = _LINE.match(line)
+    if match is None or match[1] not in GOALS:
         return line
-    sign, goal = GOALS[found[1]]
-    return f"{line}   (goal {sign} {goal:g}: {'holds' if _HOLDS[sign](float(found[2]), goal) else 'MISSED'})"
+    sign, goal = GOALS[match[1]]
+    return f"{line}   (goal {sign} {goal:g}: {'holds' if _HOLDS[sign](float(match[2]), goal) else 'MISSED'})"
 
 
 def main() -> int:

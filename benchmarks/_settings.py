@@ -1,4 +1,4 @@
-"""The production settings, with an empty view beside the leaderboard's own addresses."""
+"""The production settings, with an empty view added to the leaderboard's addresses."""
 
 from leaderboard.settings import *  # noqa: F403
 

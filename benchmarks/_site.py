@@ -1,4 +1,4 @@
-"""What benchmarks of the leaderboard share: a site of their own, its processes, and what these have used."""
+"""A site for the benchmarks of the leaderboard, its processes, and the resources that these have used."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""The board for anybody: what an answer costs beside an empty view, and how long a first reader waits.
+"""The board for anybody: what an answer costs compared with an empty view, and how long a first reader waits.
 
 gunicorn with one process, PostgreSQL, Redis, and no worker. What is compared is asked for in turns. The ratio
 is that of the web process's processor time per answer, which is the inverse ratio of requests per second
@@ -54,7 +54,7 @@ def prepare(directory: Path) -> "tuple[Edition, User]":
 
 
 def fill(edition: "Edition", *, n: int, user: "User") -> None:
-    """So many more entries."""
+    """Add `n` entries."""
     from tests import board_rows  # noqa: PLC0415
 
     board_rows.fill(edition, n=n, user=user)
@@ -75,7 +75,7 @@ def change() -> None:
 
 
 def first_reader_s(http: httpx.Client) -> float:
-    """How long the page and the JSON take for the first who asks after a change, the longer of both."""
+    """The time of the page and the JSON for the first reader after a change, the longer of both."""
     taken_s = []
     for address in [ADDRESSES["page"], ADDRESSES["json"]]:
         times_s = []

@@ -1,4 +1,4 @@
-"""What intervals and rank ranges cost a worker: boards of 28,600 sequences in 700 recordings.
+"""The cost of intervals and rank ranges for a worker: boards of 28,600 sequences in 700 recordings.
 
 Processor time of a worker that has just begun, for a board of which nothing is inferred yet; PostgreSQL's
 comes on top. OpenBLAS has one core.

@@ -1,4 +1,4 @@
-"""What a correction costs: 1,000 submissions of 28,600 sequences scored again and stored.
+"""The cost of a correction: 1,000 submissions of 28,600 sequences scored again and stored.
 
 PostgreSQL, Redis, and a Celery worker with two processes. The clock runs from the call that opens the
 edition, which reads and checks the new ground truth, until the last submission is scored in the database.

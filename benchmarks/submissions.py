@@ -92,7 +92,7 @@ def one_by_one(http: httpx.Client, data: bytes) -> float:
 
 
 def n_scored(ids: list[str]) -> int:
-    """How many of these submissions are scored."""
+    """The number of these submissions that are scored."""
     from leaderboard.models import Evaluation, Status  # noqa: PLC0415
 
     return Evaluation.objects.filter(submission__in=map(UUID, ids), status=Status.SCORED).count()
@@ -106,7 +106,7 @@ def infer_again() -> None:
 
 
 def commands(made: Site, token: str, truth: evaluator.GroundTruth, rng: np.random.Generator) -> None:
-    """The command line, started anew for each file."""
+    """The command line, started again for each file."""
     path = made.directory / "predictions.json"
     environment = os.environ | {"TSTTC_URL": made.url, "TSTTC_TOKEN": token, "NO_PROXY": "*"}
     command = [str(BIN / "tsttc"), "submit", str(path), "--split", "test", "--method", "Bench", "--wait"]

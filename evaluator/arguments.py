@@ -1,4 +1,4 @@
-"""What callers give: a file in any of its forms, and the right thing in the right place."""
+"""Check the arguments of public functions: a file in any of its forms, and objects of the right type."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def data_of(source: Source) -> bytes:
     read: Any = getattr(source, "read", None)
     if not callable(read):
         raise TypeError(f"source is {_kind(source)}; {_EXPECTED}.")
-    found = read()
-    return found.encode() if isinstance(found, str) else bytes(found)
+    content = read()
+    return content.encode() if isinstance(content, str) else bytes(content)
 
 
 def require(value: object, wanted: type, *, name: str) -> None:

@@ -45,10 +45,10 @@ def in_row_order(values: Any, *, name: str, anno_id: NDArray[np.int64] | None) -
 def _require_row_order(
     labels: list[Any], *, names_sequences: bool, name: str, anno_id: NDArray[np.int64]
 ) -> None:
-    own, places = anno_id.tolist(), list(range(len(labels)))
-    if labels == own or (labels == places and not names_sequences):
+    own, rows = anno_id.tolist(), list(range(len(labels)))
+    if labels == own or (labels == rows and not names_sequences):
         return
-    expected = own if names_sequences else places
+    expected = own if names_sequences else rows
     raise ValueError(
         f"{name} is a Series with the index {_begin(labels)}; expected {_begin(expected)}, one row for each "
         "sequence in the manifest's order, because values are taken by their place. Sort it and give "

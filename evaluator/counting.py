@@ -2,7 +2,7 @@
 
 
 def counted(n: int, singular: str, plural: str = "") -> str:
-    """How many there are; `plural` is the singular with an s unless it is given.
+    """The number with its noun; `plural` is the singular with an s unless given.
 
     >>> counted(1, "label"), counted(12, "label"), counted(2000, "entry", "entries")
     ('1 label', '12 labels', '2,000 entries')

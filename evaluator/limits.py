@@ -1,4 +1,4 @@
-"""What a child process that reads untrusted bytes gives up before it sees the first of them.
+"""The rights that a child process gives up before it reads untrusted bytes.
 
 It writes `READY` when that is done: a child that ends before has seen nothing of what it was to read.
 

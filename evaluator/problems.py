@@ -177,12 +177,12 @@ class _Line:
         if len(self.more) <= MAX_LISTED:
             self.more.append(where)
 
-    def told(self) -> Problem:
+    def merged(self) -> Problem:
         if not self.n_more:
             return self.problem
         # One name more than are shown says that there are more.
-        told = "1 more place has" if self.n_more == 1 else f"{self.n_more:,} more places have"
-        message = f"{self.problem.message} {told} this problem: {listed(self.more)}."
+        further = "1 more place has" if self.n_more == 1 else f"{self.n_more:,} more places have"
+        message = f"{self.problem.message} {further} this problem: {listed(self.more)}."
         return Problem(self.problem.code, message, self.problem.where)
 
 
@@ -229,17 +229,17 @@ class Findings:
             if self._n_unlisted[code]
         ]
         n_problems = self._counts.total() + self._n_grouped
-        raise Rejected([*(line.told() for line in self._lines), *rest], n_problems=n_problems)
+        raise Rejected([*(line.merged() for line in self._lines), *rest], n_problems=n_problems)
 
 
 def n_problems_in_words(n_problems: int, *, n_lines: int) -> str:
-    """How many problems, and why the list below has fewer lines.
+    """The number of problems, and why the list below has fewer lines.
 
     >>> n_problems_in_words(1, n_lines=1), n_problems_in_words(7_000, n_lines=1)
     ('1 problem', '7,000 problems; equal ones share a line')
     """
-    told = counted(n_problems, "problem")
-    return f"{told}; equal ones share a line" if n_lines < n_problems else told
+    count = counted(n_problems, "problem")
+    return f"{count}; equal ones share a line" if n_lines < n_problems else count
 
 
 def reject(code: str, message: str, where: str = "") -> Rejected:

@@ -45,7 +45,7 @@ class NotVerified(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verified:
-    """What a receipt says, its signature checked. `method` is the name that it had when it was signed."""
+    """A receipt with a checked signature. `method` is the name that the method had when it was signed."""
 
     site: str
     key_id: str
@@ -137,7 +137,7 @@ def sign(document: Mapping[str, Any], *, private_key: bytes) -> str:
 
 
 def verify(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
-    """What the receipt says, if one of these keys (see `read_keys`) signed it so. Raises `NotVerified`."""
+    """Check that one of these keys (see `read_keys`) signed the receipt; read it. Raises `NotVerified`."""
     if len(receipt) > MAX_BYTES:
         raise _malformed(f"it has {len(receipt):,} bytes; expected at most {MAX_BYTES:,}")
     try:
@@ -148,7 +148,7 @@ def verify(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
                 f"The receipt has the version {document['version']}; expected at most {VERSION}, the last "
                 "that this release of tsttc knows.",
             )
-        return _said(document, named)
+        return _verified(document, named)
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
         raise _malformed("it cannot be read; expected what the leaderboard wrote") from None
 
@@ -188,7 +188,7 @@ def _malformed(what: str) -> NotVerified:
     return NotVerified("receipt-malformed", f"This is not a receipt: {what}.")
 
 
-def _said(document: Document, named: str) -> Verified:
+def _verified(document: Document, named: str) -> Verified:
     """A signed document, in the order of its protocol; of one that is newer, in the order of names."""
     rules = PROTOCOLS.get(document["protocol"])
     names = rules.score_names if rules else sorted(document["scores"])

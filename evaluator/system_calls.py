@@ -1,4 +1,4 @@
-"""What a process that reads untrusted bytes may still ask of the kernel: a seccomp filter.
+"""A seccomp filter of the system calls that a process may make while it reads untrusted bytes.
 
 The filter allows what a single thread needs that computes, reads what it has open, and writes its answer. All
 else is answered EPERM, so that a library that asks for more than it needs goes on without; a process of
@@ -88,13 +88,13 @@ def program_for(machine: str) -> bytes:
 
 def _instructions(machine: str) -> Iterator[tuple[int, int, int, int]]:
     """Operation, instructions to skip where the words are equal and where they are not, operand."""
-    place, architecture = _ARCHITECTURES[machine]
+    column, architecture = _ARCHITECTURES[machine]
     yield _LOAD, 0, 0, 4
     yield _JUMP_IF_EQUAL, 1, 0, architecture
     yield _RETURN, 0, 0, _KILL
     yield _LOAD, 0, 0, 0
     for numbers in ALLOWED.values():
-        yield _JUMP_IF_EQUAL, 0, 1, numbers[place]
+        yield _JUMP_IF_EQUAL, 0, 1, numbers[column]
         yield _RETURN, 0, 0, _ALLOW
     yield _RETURN, 0, 0, _REFUSE
 

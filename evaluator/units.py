@@ -29,12 +29,12 @@ _DATE: Final = re.compile(r"((?:19|20)\d\d)([-_]?)(\d\d)\2(\d\d)(?!\d)", re.ASCI
 
 
 def noun_of(kind: str) -> str:
-    """What one unit of this kind is called."""
+    """The noun for one unit of this kind."""
     return _NOUNS.get(kind, kind)
 
 
 def in_words(kind: str, n: int | None = None) -> str:
-    """So many units of a kind, or all of them where their number is not known.
+    """`n` units of a kind in words, or the noun alone.
 
     >>> in_words("day", 42), in_words("recording", 1), in_words("given", 12), in_words("day")
     ('42 days', '1 recording', '12 units', 'days')
@@ -51,11 +51,11 @@ def day_of(recording: str) -> date | None:
     >>> day_of("2023-02-30-08"), day_of("1680757246797143"), day_of("sim-20240506-080000")
     (None, None, None)
     """
-    found = _DATE.match(recording)
-    if found is None:
+    match = _DATE.match(recording)
+    if match is None:
         return None
     try:
-        return date(int(found[1]), int(found[3]), int(found[4]))
+        return date(int(match[1]), int(match[3]), int(match[4]))
     except ValueError:
         return None
 
@@ -108,5 +108,5 @@ def _days(recordings: Sequence[str]) -> list[str] | None:
 
 def _grouped(kind: str, labels: Sequence[str]) -> Units:
     names = tuple(sorted(set(labels)))
-    place = {name: i for i, name in enumerate(names)}
-    return Units(kind, names, tuple(place[label] for label in labels))
+    position = {name: i for i, name in enumerate(names)}
+    return Units(kind, names, tuple(position[label] for label in labels))

@@ -1,4 +1,4 @@
-"""Ablations of Pixel MSE: one setting varied, everything else as in the paper, scores beside the paper's.
+"""Ablations of Pixel MSE: one setting varied, everything else as in the paper, scores next to the paper's.
 
     rows = scores_of_settings(get_ablation("frame-gap"), folder=folder, truth=truth)
 
@@ -34,7 +34,7 @@ FRAME_GAP: Final = 5
 
 @dataclass(frozen=True, slots=True)
 class Ablation:
-    """What is varied: `parameter` of Pixel MSE, or the frame gap where that is None.
+    """The varied setting: `parameter` of Pixel MSE, or the frame gap if that is None.
 
     `table` names the paper's table, and is None where the paper has none.
     """

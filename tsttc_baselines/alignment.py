@@ -90,7 +90,7 @@ def _starts(clip: Clip, *, frame_gap: int) -> Iterator[float]:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Where an alignment ended.
+    """The scale ratio and centre that an alignment reached.
 
     `residual` is 1 - r², r the correlation of the two patches: what gain and offset leave unexplained, 0…1.
     """

@@ -72,8 +72,8 @@ def _lines(path: Path) -> tuple[list[tuple[int, str]], bool]:
     lines = list(enumerate(read_text(path).splitlines(), start=1))
     units = {line.replace(" ", "") for _, line in lines if line.replace(" ", "").startswith("#unit=")}
     if units - {NORMALISED, PIXELS} or len(units) > 1:
-        found = quoted(", ".join(sorted(units)))
-        message = f"The unit is {found}; expected {NORMALISED}, {PIXELS} or no such line."
+        stated = quoted(", ".join(sorted(units)))
+        message = f"The unit is {stated}; expected {NORMALISED}, {PIXELS} or no such line."
         raise reject("bad-field", message, path.name)
     return [(n, line) for n, line in lines if line.strip() and not line.startswith("#")], NORMALISED in units
 

@@ -206,14 +206,14 @@ def _write(canvas: Image, text: Text) -> None:
     if hasattr(cv2, "FontFace"):  # OpenCV 5 brings a typeface
         face, weight = cv2.FontFace("sans"), 700 if text.is_bold else 400
         _, _, width, _ = cv2.getTextSize((0, 0), text.text, (0, 0), face, size, weight)
-        place = (round(text.x * PNG_SCALE - share * width), round(text.y * PNG_SCALE))
-        cv2.putText(canvas, text.text, place, colour, face, size, weight)
+        origin = (round(text.x * PNG_SCALE - share * width), round(text.y * PNG_SCALE))
+        cv2.putText(canvas, text.text, origin, colour, face, size, weight)
         return
     plain = text.text.replace("α", "scale ratio").replace("τ", "TTC").encode("ascii", "replace").decode()
     scale, thickness = size / 30, 2 if text.is_bold else 1
     (width, _), _ = cv2.getTextSize(plain, cv2.FONT_HERSHEY_SIMPLEX, scale, thickness)
-    place = (round(text.x * PNG_SCALE - share * width), round(text.y * PNG_SCALE))
-    cv2.putText(canvas, plain, place, cv2.FONT_HERSHEY_SIMPLEX, scale, colour, thickness, cv2.LINE_AA)
+    origin = (round(text.x * PNG_SCALE - share * width), round(text.y * PNG_SCALE))
+    cv2.putText(canvas, plain, origin, cv2.FONT_HERSHEY_SIMPLEX, scale, colour, thickness, cv2.LINE_AA)
 
 
 def _fixed(value: float) -> int:

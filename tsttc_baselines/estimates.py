@@ -1,4 +1,4 @@
-"""What a baseline is: a function of a clip that estimates one scale ratio."""
+"""The interface of a baseline: a function of a clip that estimates one scale ratio."""
 
 from __future__ import annotations
 

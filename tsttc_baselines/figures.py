@@ -33,7 +33,7 @@ class FrameCrop:
         self._low = centre - reach_px / 2
         self._scale = side / reach_px
 
-    def place(self, box: Floats) -> list[float]:
+    def to_figure(self, box: Floats) -> list[float]:
         """A box of the frame in units of the figure."""
         corner = np.array([self.picture.x, self.picture.y] * 2)
         return [float(value) for value in (box - np.tile(self._low, 2)) * self._scale + corner]
@@ -78,16 +78,16 @@ def _add_crops(figure: Figure, clip: Clip, estimator: PixelMse, match: Match, fr
     scale, size = float(match.scales[best]), size_of(target_box)
     cell_px = size / patches.cells_of(target_box, max_cells=estimator.cells)
     middle = centre_of(reference_box) + scale * cell_px * match.shifts[best]
-    found_box = box_around(middle, scale * size)
+    matched_box = box_around(middle, scale * size)
     # Both crops have one scale, so that the eye sees the change of size; the third follows the found box.
     reach_px = 1.35 * float(max(size_of(reference_box).max(), size.max()))
-    places = [MARGIN + i * (side + GAP) for i in range(4)]
+    crop_x = [MARGIN + i * (side + GAP) for i in range(4)]
     ours, theirs, matched = (
         FrameCrop(image, centre=centre, reach_px=reach, x=x, y=top, side=side)
         for image, centre, reach, x in (
-            (frames[0], centre_of(reference_box), reach_px, places[0]),
-            (frames[1], centre_of(target_box), reach_px, places[1]),
-            (frames[0], middle, scale * reach_px, places[2]),
+            (frames[0], centre_of(reference_box), reach_px, crop_x[0]),
+            (frames[1], centre_of(target_box), reach_px, crop_x[1]),
+            (frames[0], middle, scale * reach_px, crop_x[2]),
         )
     )
     left = cv2.absdiff(theirs.picture.pixels, matched.picture.pixels)
@@ -95,15 +95,18 @@ def _add_crops(figure: Figure, clip: Clip, estimator: PixelMse, match: Match, fr
     colours = figure.theme
     figure.shapes += [
         ours.picture,
-        outline(ours.place(reference_box), colour=colours.accent),
-        outline(ours.place(found_box), colour=colours.mark),
+        outline(ours.to_figure(reference_box), colour=colours.accent),
+        outline(ours.to_figure(matched_box), colour=colours.mark),
         theirs.picture,
-        outline(theirs.place(target_box), colour=colours.accent),
+        outline(theirs.to_figure(target_box), colour=colours.accent),
         matched.picture,
-        outline(matched.place(found_box), colour=colours.mark),
-        Picture(strong, places[3], top, side, side),
+        outline(matched.to_figure(matched_box), colour=colours.mark),
+        Picture(strong, crop_x[3], top, side, side),
         outline(
-            [places[3] + v - places[1] if i % 2 == 0 else v for i, v in enumerate(theirs.place(target_box))],
+            [
+                crop_x[3] + v - crop_x[1] if i % 2 == 0 else v
+                for i, v in enumerate(theirs.to_figure(target_box))
+            ],
             colour=colours.mark,
             width=1,
         ),
@@ -114,7 +117,7 @@ def _add_crops(figure: Figure, clip: Clip, estimator: PixelMse, match: Match, fr
         ("Reference, enlarged", f"by 1/{scale:.3f}, about the found box"),
         ("Difference, × 3", f"RMS {math.sqrt(float(match.errors[best])):.1f} grey levels"),
     )
-    for x, (first, second) in zip(places, captions, strict=True):
+    for x, (first, second) in zip(crop_x, captions, strict=True):
         figure.shapes.append(Text(first, x, top + side + 20, colours.ink, is_bold=True))
         figure.shapes.append(Text(second, x, top + side + 37, colours.quiet, size=12))
 
@@ -173,9 +176,9 @@ def _add_curve(
     for ratio, height, words, colour in marked:
         figure.shapes.append(Line([(x(ratio), height - 12), (x(ratio), bottom)], colour, 1.5))
         is_left = ratio < 1.2
-        place = x(ratio) + (6 if is_left else -6)
+        text_x = x(ratio) + (6 if is_left else -6)
         anchor: Anchor = "start" if is_left else "end"
-        figure.shapes.append(Text(words, place, height, colour, 13, anchor, is_bold=True))
+        figure.shapes.append(Text(words, text_x, height, colour, 13, anchor, is_bold=True))
     for i in best_of(match.errors, n_top=estimator.top):
         figure.shapes.append(Dot(x(float(match.scales[i])), y(float(errors[i])), 4, colours.mark))
 

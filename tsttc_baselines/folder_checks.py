@@ -1,4 +1,4 @@
-"""What is wrong with a folder as a whole, found before a method runs.
+"""Faults of a folder as a whole, checked before a method runs.
 
 A fault of single sequences takes their fallback; one that all of them share is a fault of the folder.
 """

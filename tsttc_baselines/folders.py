@@ -110,10 +110,10 @@ class SequenceFolder:
         """An image; raises `SequenceFault` unless it has the size of the other."""
         image = cache.image(path, colour=colour, where=self.where(path))
         expected = cache.size(like, where=self.where(like))
-        found = (image.shape[1], image.shape[0])
-        if found != expected:
+        size = (image.shape[1], image.shape[0])
+        if size != expected:
             message = (
-                f"The image has {found[0]}×{found[1]} pixels; "
+                f"The image has {size[0]}×{size[1]} pixels; "
                 f"expected {expected[0]}×{expected[1]} as in the target frame of its sequence."
             )
             raise SequenceFault("image has another size", Problem("bad-frame", message, self.where(path)))
@@ -173,12 +173,12 @@ def read_folder(path: Path) -> SequenceFolder:
         boxes, is_normalised = read_boxes(path / BOXES, manifest=manifest)
         return SequenceFolder(path, root, manifest, boxes, BOXES, is_normalised)
     given = _manifest(path) if (path / MANIFEST).is_file() else None
-    found = read_toolkit_folder(path, manifest=given)
-    if found is None:
+    annotated = read_toolkit_folder(path, manifest=given)
+    if annotated is None:
         expected = f"expected {MANIFEST} and {BOXES}, or the dataset's annotation files (*.pkl)"
         missing = f"no {BOXES} and no" if given is not None else f"neither {MANIFEST} with {BOXES} nor"
         raise reject("unreadable", f"The folder has {missing} annotation files; {expected}.", path.name)
-    manifest, boxes = found
+    manifest, boxes = annotated
     return SequenceFolder(
         path,
         root,
@@ -214,9 +214,9 @@ def read_toolkit_folder(
     """
     if not list_files(path):
         return None
-    found = read_annotations(path, with_ttc=False, with_boxes=True)
-    own = Manifest.from_table(found.table)
-    boxes = np.array(found.boxes, dtype=np.float64).reshape(own.n_sequences, -1, 4)
+    annotated = read_annotations(path, with_ttc=False, with_boxes=True)
+    own = Manifest.from_table(annotated.table)
+    boxes = np.array(annotated.boxes, dtype=np.float64).reshape(own.n_sequences, -1, 4)
     if manifest is None or manifest.digest == own.digest:
         return own, boxes
     require_the_same(own.natural_keys, manifest.natural_keys, path.name)

@@ -34,10 +34,10 @@ class ImageCache:
     def image(self, path: Path, *, colour: bool, where: str) -> Image:
         """The image, read-only; raises `SequenceFault` at `where` for a file that is no whole image."""
         key = (path, colour)
-        found = self._images.get(key)
-        if found is not None:
+        cached = self._images.get(key)
+        if cached is not None:
             self._images.move_to_end(key)
-            return found
+            return cached
         image = decode(path, colour=colour, where=where)
         image.setflags(write=False)
         self._keep(key, image)

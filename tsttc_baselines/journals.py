@@ -1,7 +1,7 @@
-"""The journal of a run: outcomes as they come, so that a run that was ended goes on where it stopped.
+"""The journal of a run: outcomes as they come, so that an ended run continues where it stopped.
 
 It is a text beside the output: a line that says which run this is, then a line of JSON for each piece of
-work. What was half-written when the run ended is cut off; a journal of another run is begun anew. Two runs
+work. What was half-written when the run ended is cut off; a journal of another run is begun again. Two runs
 at once cannot have one journal.
 """
 
@@ -29,7 +29,7 @@ class Journal:
 
     def __init__(self, path: Path, *, key: str) -> None:
         self.path = path
-        self.found: list[Outcome] = []
+        self.outcomes: list[Outcome] = []
         self.seconds = 0.0
         path.touch()
         self._file: IO[bytes] = path.open("r+b")
@@ -53,7 +53,7 @@ class Journal:
                 break
             end += len(line)
             self.seconds = max(self.seconds, entry.get("seconds", 0.0))
-            self.found += [Outcome(row, value) for row, value in entry.get("values", ())]
+            self.outcomes += [Outcome(row, value) for row, value in entry.get("values", ())]
         return end
 
     def add(self, outcomes: Sequence[Outcome], *, seconds: float) -> None:
@@ -92,7 +92,7 @@ def _lock(file: IO[bytes]) -> None:
 
 
 def _entry(line: bytes) -> dict[str, Any] | None:
-    """What a line says; None for one that is not whole."""
+    """Parse a line; None for one that is not whole."""
     if not line.endswith(b"\n"):
         return None
     try:

@@ -1,4 +1,4 @@
-"""How an axis of a frame is sampled between its pixels: a Gaussian about each position."""
+"""Sampling of an axis of a frame between its pixels: a Gaussian about each position."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _REACH: Final = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """How one axis of a frame is sampled: a Gaussian about each position, cut off where the frame ends.
+    """The sampling of one axis of a frame: a Gaussian about each position, cut off where the frame ends.
 
     `weights` (n, k) times the pixels of the slice `pixels` (k,) gives the samples; `slopes` gives their
     derivatives by position.

@@ -81,5 +81,5 @@ class SequenceEstimator:
         return Outcome(row, value, reason, problem)
 
     def _problem(self, row: int, message: str) -> Problem:
-        place = f"sequence {self.folder.manifest.anno_id[row]}"
-        return Problem("no-estimate", f"{message[0].upper()}{message[1:]}.", place)
+        where = f"sequence {self.folder.manifest.anno_id[row]}"
+        return Problem("no-estimate", f"{message[0].upper()}{message[1:]}.", where)

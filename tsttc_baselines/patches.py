@@ -72,8 +72,8 @@ class Window:
         maps = np.empty((2, *shape), dtype=np.float32)
         maps[0], maps[1] = columns[:, np.newaxis, :], rows[:, :, np.newaxis]
         map_x, map_y = maps[0].reshape(-1, row), maps[1].reshape(-1, row)
-        found = cv2.remap(self.pixels, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        return np.asarray(found, dtype=np.float32).reshape(shape + self.pixels.shape[2:])
+        sampled = cv2.remap(self.pixels, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(sampled, dtype=np.float32).reshape(shape + self.pixels.shape[2:])
 
 
 def cut(image: Image, *, centre: ArrayLike, size: ArrayLike, pixel_size: float = 1.0) -> Window:
@@ -111,8 +111,8 @@ def grid_about(centre: float, *, n_cells: int, cell_px: ArrayLike) -> Floats:
     >>> grid_about(10.0, n_cells=3, cell_px=[1.0, 2.0]).tolist()
     [[9.0, 10.0, 11.0], [8.0, 10.0, 12.0]]
     """
-    places = np.arange(n_cells) - (n_cells - 1) / 2
-    return np.asarray(centre + np.multiply.outer(np.asarray(cell_px, dtype=np.float64), places))
+    offsets = np.arange(n_cells) - (n_cells - 1) / 2
+    return np.asarray(centre + np.multiply.outer(np.asarray(cell_px, dtype=np.float64), offsets))
 
 
 def boxes_of_pair(clip: Clip, *, frame_gap: int) -> tuple[Floats, Floats]:

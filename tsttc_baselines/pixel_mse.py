@@ -198,7 +198,7 @@ class Comparison:
 
     @property
     def variance(self) -> float:
-        """That of the patch, in squared grey levels."""
+        """The variance of the patch, in squared grey levels."""
         return self._energy / self.patch.size
 
     @property
@@ -273,8 +273,8 @@ def near_the_best(comparison: Comparison, scales: Floats, *, max_shift: int) -> 
     coarse = comparison.coarser(COARSE_CELLS)
     coarse_shift = math.ceil(max_shift * float(np.max(comparison.cell_px / coarse.cell_px)))
     errors = coarse.errors(scales[::COARSE_STEP], max_shift=coarse_shift)
-    place = COARSE_STEP * int(np.argmin(errors.min(axis=(1, 2))))
-    return scales[max(0, place - NEAR) : place + NEAR + 1]
+    index = COARSE_STEP * int(np.argmin(errors.min(axis=(1, 2))))
+    return scales[max(0, index - NEAR) : index + NEAR + 1]
 
 
 def _match(comparison: Comparison, scales: Floats, errors: Floats, *, n_top: int) -> Match:

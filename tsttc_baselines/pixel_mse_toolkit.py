@@ -68,8 +68,8 @@ class Crops:
             np.clip(((length - n / scale) / 2 + (np.arange(n) + 0.5) / scale).astype(int), 0, length - 1)
             for length, n in zip(shape, self.patch, strict=True)
         )
-        found: Pixels = self.target.take(rows, axis=1).take(columns, axis=2)
-        return found
+        pixels: Pixels = self.target.take(rows, axis=1).take(columns, axis=2)
+        return pixels
 
 
 def crops_of(
@@ -155,13 +155,13 @@ def settle_ties(crops: Crops, scales: Floats, least: Floats, shifts: NDArray[np.
     float32 round them apart, on each processor in its own way, and so choose other bins.
     """
     bound = float(np.sort(least)[min(n_top, len(least)) - 1])
-    for place in np.flatnonzero(least <= bound * (1 + NEARLY) + SMALLEST):
-        scale = float(scales[place])
-        left, top = crops.starts(scale) + shifts[place] + crops.margin
+    for index in np.flatnonzero(least <= bound * (1 + NEARLY) + SMALLEST):
+        scale = float(scales[index])
+        left, top = crops.starts(scale) + shifts[index] + crops.margin
         columns, rows = crops.patch
         part = crops.reference[:, top : top + rows, left : left + columns]
         difference = np.subtract(part, crops.resampled(scale), dtype=np.float64)
-        least[place] = np.mean(np.square(difference))
+        least[index] = np.mean(np.square(difference))
 
 
 def _errors_of_group(part: Pixels, crops: Crops, scales: Floats, offsets: NDArray[np.int_]) -> Floats:
@@ -171,15 +171,15 @@ def _errors_of_group(part: Pixels, crops: Crops, scales: Floats, offsets: NDArra
     placed = np.zeros((len(scales), *part.shape), dtype=np.float32)
     for patch, scale, (x, y) in zip(placed, scales, offsets, strict=True):
         patch[:, y : y + height, x : x + width] = crops.resampled(scale)
-    patches_in_place = placed.reshape(len(scales), -1)
+    flat_patches = placed.reshape(len(scales), -1)
     # Written row after row, a shift by (dx, dy) is one by dx + dy · row length: copies for dx, views for dy.
-    row_length, length = part.shape[2], patches_in_place.shape[1]
+    row_length, length = part.shape[2], flat_patches.shape[1]
     pixels = np.pad(part.ravel(), (0, n_shifts * row_length))
     across = np.stack([pixels[dx : dx + length + 2 * crops.margin * row_length] for dx in range(n_shifts)])
     products = np.empty((len(scales), n_shifts, n_shifts))
     for dy in range(n_shifts):
-        products[:, dy] = patches_in_place @ across[:, dy * row_length : dy * row_length + length].T
-    own = np.einsum("nk,nk->n", patches_in_place, patches_in_place, dtype=np.float64)
+        products[:, dy] = flat_patches @ across[:, dy * row_length : dy * row_length + length].T
+    own = np.einsum("nk,nk->n", flat_patches, flat_patches, dtype=np.float64)
     energies = _energies(part, offsets, width=int(width), height=int(height), n_shifts=n_shifts)
     return np.asarray((energies - 2.0 * products + own[:, np.newaxis, np.newaxis]) / (3 * width * height))
 

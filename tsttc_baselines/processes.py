@@ -78,7 +78,7 @@ def _in_turn(
     open_pieces: set[Future[list[Any]]] = set()
     while True:
         while len(open_pieces) < n_ahead and (piece := next(left, None)) is not None:
-            with _interrupts_held():
+            with _interrupts_blocked():
                 open_pieces.add(pool.submit(_work, piece))
         if not open_pieces:
             return
@@ -90,7 +90,7 @@ def _in_turn(
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
+def _interrupts_blocked() -> Iterator[None]:
     """A process that starts meanwhile never gets a Ctrl-C, which is for its parent; not so on Windows."""
     if not hasattr(signal, "pthread_sigmask"):
         yield

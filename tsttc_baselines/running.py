@@ -43,7 +43,7 @@ Progress = Callable[[int], None]
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What a run has done. `scale_ratio` is (n,) in the manifest's order.
+    """The estimates of a run. `scale_ratio` is (n,) in the manifest's order.
 
     `n_fallback` counts by reason, the most frequent first, and `examples` has a problem for each reason.
     `n_resumed` values come from an earlier run that was ended. `seconds` are those of all of them.
@@ -83,7 +83,7 @@ def run_method(
     key = _key(folder, method, filled, frame_gap)
     began_s = time.perf_counter()
     with Journal(out.with_name(out.name + ".part"), key=key) as journal:
-        outcomes = {outcome.row: outcome for outcome in journal.found}
+        outcomes = {outcome.row: outcome for outcome in journal.outcomes}
         n_resumed = len(outcomes)
         progress(n_resumed)
         rows = [row for row in folder.rows_in_time().tolist() if row not in outcomes]
@@ -159,7 +159,7 @@ def _key(folder: SequenceFolder, method: Method, parameters: Mapping[str, Value]
 
 
 def _plain(parameters: Mapping[str, Value]) -> dict[str, object]:
-    """The parameters as JSON has them; of a file its name, for its folder is nobody's business."""
+    """The parameters for JSON; a file by its name alone, because its folder is private."""
     return {name: value.name if isinstance(value, Path) else value for name, value in parameters.items()}
 
 

@@ -58,9 +58,9 @@ def at_best_shifts(errors: Floats) -> tuple[Floats, NDArray[np.int_]]:
     """
     n_shifts = errors.shape[2]
     flat = errors.reshape(len(errors), -1)
-    places = np.argmin(flat, axis=1)
-    shifts = np.stack([places % n_shifts, places // n_shifts], axis=1) - n_shifts // 2
-    return flat[np.arange(len(errors)), places], shifts
+    indices = np.argmin(flat, axis=1)
+    shifts = np.stack([indices % n_shifts, indices // n_shifts], axis=1) - n_shifts // 2
+    return flat[np.arange(len(errors)), indices], shifts
 
 
 def weighted_scale_ratio(scales: Floats, errors: Floats) -> float:
@@ -75,7 +75,7 @@ def weighted_scale_ratio(scales: Floats, errors: Floats) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Match:
-    """What a search over scale bins found.
+    """The matches of a search over scale bins.
 
     `scales` (n,) are the scale ratios that were tried, ascending; `errors` (n,) their mean squared errors,
     each at its best shift, in squared grey levels; `shifts` (n, 2) these shifts, x and y, in cells of the

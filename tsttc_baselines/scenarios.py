@@ -147,7 +147,7 @@ def _closing_runs(closed: bool) -> Iterator[Run]:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Where ego and vehicle are at some times: arrays of one shape, NaN after the end of a run."""
+    """The positions of ego and vehicle at some times: arrays of one shape, NaN after the end of a run."""
 
     gap_m: Floats
     lateral_m: Floats
@@ -235,7 +235,7 @@ class Motion:
 
 
 def solve(all_runs: list[Run]) -> Motion:
-    """Solve all runs together: in each round every run goes on to its next event.
+    """Solve all runs together: in each round every run continues to its next event.
 
     The loop makes one round for each phase that the longest run has, however many runs there are.
     """
@@ -294,7 +294,7 @@ def _time_to_gap(phase: _Phase, gap_m: Floats) -> Floats:
 
 
 def _time_to_standstill(phase: _Phase) -> Floats:
-    """Seconds until a braking vehicle stands."""
+    """Seconds until a braking vehicle has stopped."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(phase.vehicle_mps2 < 0, -phase.state.vehicle_mps / phase.vehicle_mps2, _NEVER)
 

@@ -1,4 +1,4 @@
-"""What is wrong with the boxes of a sequence, in a few words to be counted and in a sentence."""
+"""Faults of a sequence's boxes, each with a short reason for counting and a sentence."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ def require_boxes(folder: SequenceFolder, row: int, frames: Iterable[int]) -> No
     for frame in frames:
         x1, y1, x2, y2 = box = folder.boxes[row, frame].tolist()
         name = "target" if frame == TARGET else f"reference frame {frame}"
-        found = f"The box of the {name} is {_shown(box)}"
+        statement = f"The box of the {name} is {_shown(box)}"
         if all(map(math.isnan, box)):
             kind = "target" if frame == TARGET else "reference"
             message = f"There is no box for the {name}; expected one."
             raise _fault(folder, row, f"no box in the {kind} frame", message)
         if not all(map(math.isfinite, box)):
-            raise _fault(folder, row, "box is not a number", f"{found}; expected numbers.")
+            raise _fault(folder, row, "box is not a number", f"{statement}; expected numbers.")
         if x2 < x1 or y2 < y1:
-            raise _fault(folder, row, "box is reversed", f"{found}; expected x1 < x2 and y1 < y2.")
+            raise _fault(folder, row, "box is reversed", f"{statement}; expected x1 < x2 and y1 < y2.")
         if x2 == x1 or y2 == y1:
-            raise _fault(folder, row, "box is empty", f"{found}; expected an area.")
+            raise _fault(folder, row, "box is empty", f"{statement}; expected an area.")
 
 
 def require_sizes(
@@ -60,18 +60,18 @@ def require_sizes(
     """
     for frame in frames:
         x1, y1, x2, y2 = box = clip.boxes[frame].tolist()
-        found = f"The box of frame {frame} is {_shown(box)}"
+        statement = f"The box of frame {frame} is {_shown(box)}"
         if min(x2 - x1, y2 - y1) < MIN_SIDE_PX:
-            message = f"{found}; expected sides of at least {MIN_SIDE_PX:g} px."
+            message = f"{statement}; expected sides of at least {MIN_SIDE_PX:g} px."
             raise _fault(folder, row, f"box is smaller than {MIN_SIDE_PX:g} px", message)
         if image_px is not None and (x2 <= 0 or y2 <= 0 or x1 >= image_px[0] or y1 >= image_px[1]):
-            message = f"{found}; expected one inside of {image_px[0]}×{image_px[1]} px."
+            message = f"{statement}; expected one inside of {image_px[0]}×{image_px[1]} px."
             raise _fault(folder, row, "box lies outside the image", message)
 
 
 def _fault(folder: SequenceFolder, row: int, reason: str, message: str) -> SequenceFault:
-    place = f"{folder.boxes_from}, sequence {folder.manifest.anno_id[row]}"
-    return SequenceFault(reason, Problem("bad-box", message, place))
+    where = f"{folder.boxes_from}, sequence {folder.manifest.anno_id[row]}"
+    return SequenceFault(reason, Problem("bad-box", message, where))
 
 
 def _shown(box: list[float]) -> str:

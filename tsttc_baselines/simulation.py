@@ -44,7 +44,7 @@ class Split:
 
     @property
     def n_sequences(self) -> int:
-        """How many sequences the split has; their anno_ids are 0 … n − 1."""
+        """The number of sequences of the split; their anno_ids are 0 … n − 1."""
         return len(self.vehicle)
 
     @cached_property
@@ -76,7 +76,7 @@ SHAPES: Final = {
 
 
 def range_counts(*, n_sequences: int, shape: Shape) -> dict[str, int]:
-    """How many sequences each TTC range has, and how many lie beyond ±20 s; they add up to `n_sequences`.
+    """The number of sequences of each TTC range, and of those beyond ±20 s; they add up to `n_sequences`.
 
     >>> range_counts(n_sequences=28_600, shape=SHAPES["test"])["crucial"]
     3771
@@ -232,7 +232,7 @@ def _assemble(rng: np.random.Generator, tracks: list[Track], *, n_recordings: in
             for window in range(tracks[index].ttc_s.size)
         ]
     rows.sort(key=lambda row: row[0])
-    keys, places = [row[0] for row in rows], [row[1:] for row in rows]
+    keys, windows = [row[0] for row in rows], [row[1:] for row in rows]
     bag_stamps, cam_ids, ts_ns, track_ids = (list(column) for column in zip(*keys, strict=True))
     return Split(
         table=Table(
@@ -241,10 +241,10 @@ def _assemble(rng: np.random.Generator, tracks: list[Track], *, n_recordings: in
             cam_id=cam_ids,
             ts_ns=ts_ns,
             track_id=track_ids,
-            ttc_s=[round(float(tracks[index].ttc_s[window]), 6) for index, window in places],
+            ttc_s=[round(float(tracks[index].ttc_s[window]), 6) for index, window in windows],
         ),
-        vehicle=tuple(tracks[index].vehicle for index, _ in places),
-        gap_m=np.stack([tracks[index].gap_m[window] for index, window in places]),
-        lateral_m=np.stack([tracks[index].lateral_m[window] for index, window in places]),
-        ego_mps=np.array([tracks[index].ego_mps[window] for index, window in places]),
+        vehicle=tuple(tracks[index].vehicle for index, _ in windows),
+        gap_m=np.stack([tracks[index].gap_m[window] for index, window in windows]),
+        lateral_m=np.stack([tracks[index].lateral_m[window] for index, window in windows]),
+        ego_mps=np.array([tracks[index].ego_mps[window] for index, window in windows]),
     )

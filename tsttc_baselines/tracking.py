@@ -86,11 +86,11 @@ class Tracking:
             raise Unusable("no box in the target frame")
         backwards = range(TARGET, TARGET - frame_gap - 1, -1)
         if self.tracker == "median-flow":
-            found, confidence = median_flow([clip.grey(frame) for frame in backwards], box=box)
+            tracked_box, confidence = median_flow([clip.grey(frame) for frame in backwards], box=box)
         else:
             frames = [clip.colour(frame) for frame in backwards]
-            found, confidence = _follow(self._create(), frames, box=box), 1.0
-        scale_ratio = float(scale_ratio_of_boxes(found, box, measure=self.measure))
+            tracked_box, confidence = _follow(self._create(), frames, box=box), 1.0
+        scale_ratio = float(scale_ratio_of_boxes(tracked_box, box, measure=self.measure))
         return Estimate(scale_ratio, confidence=confidence)
 
     def _create(self) -> Any:
@@ -123,15 +123,15 @@ def _followed(before: Image, after: Image, box: Box) -> tuple[NDArray[np.float64
     ends, went = _flow(first, second, starts)
     returns, came = _flow(second, first, ends)
     error = np.linalg.norm(returns - starts, axis=1)
-    found = went & came
-    if np.count_nonzero(found) < _MIN_POINTS:
+    is_followed = went & came
+    if np.count_nonzero(is_followed) < _MIN_POINTS:
         raise Unusable("too few points could be followed")
-    middle = float(np.median(error[found]))
+    middle = float(np.median(error[is_followed]))
     if middle > _MAX_RETURN_ERROR * float(min(size_of(box))):
         raise Unusable("the tracker lost the object")
-    found &= error <= middle
+    is_followed &= error <= middle
     origin = np.array([x0, y0]) + 0.5
-    return starts[found] + origin, ends[found] + origin
+    return starts[is_followed] + origin, ends[is_followed] + origin
 
 
 def _surroundings(box: Box, frame: Image) -> tuple[int, int, int, int]:
@@ -207,11 +207,11 @@ def _nano(backbone: str | Path | None, head: str | Path | None) -> Any:
 def _follow(tracker: Any, frames: list[Image], *, box: Box) -> Box:
     """The box in the last of these colour frames; OpenCV's trackers round boxes to whole pixels."""
     x1, y1, x2, y2 = (round(float(value)) for value in box)
-    found = (x1, y1, x2 - x1, y2 - y1)
-    tracker.init(frames[0], found)
+    tracked = (x1, y1, x2 - x1, y2 - y1)
+    tracker.init(frames[0], tracked)
     for frame in frames[1:]:
-        kept, found = tracker.update(frame)
-        if not kept or min(found[2:]) <= 0:
+        kept, tracked = tracker.update(frame)
+        if not kept or min(tracked[2:]) <= 0:
             raise Unusable("the tracker lost the object")
-    left, top, width, height = found
+    left, top, width, height = tracked
     return np.array([left, top, left + width, top + height], dtype=np.float64)

@@ -65,19 +65,19 @@ class _Group(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         # In the order in which they are used, not of the alphabet; those of other packages after them.
-        return [*COMMANDS, *(name for name in plugins.found() if name not in COMMANDS)]
+        return [*COMMANDS, *(name for name in plugins.commands() if name not in COMMANDS)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name in COMMANDS:
             return _imported(cmd_name)
-        point = plugins.found().get(cmd_name)
+        point = plugins.commands().get(cmd_name)
         return None if point is None else plugins.loaded(point)
 
 
 def _imported(command: str) -> click.Command:
     module, _, name = COMMANDS[command].partition(":")
-    found: click.Command = getattr(import_module(f"evaluator.cli.{module}"), name)
-    return found
+    click_command: click.Command = getattr(import_module(f"evaluator.cli.{module}"), name)
+    return click_command
 
 
 def own_commands() -> dict[str, click.Command]:

@@ -19,7 +19,7 @@ from evaluator.cli.tokens import account, checked, forget_token, keep_token
 if TYPE_CHECKING:
     from evaluator.client.answers import Foreseen, Quota
 
-N_MOVED_TOLD = 5  # rows whose rank changes; the first show what the others do
+N_MOVED_SHOWN = 5  # rows whose rank changes; the first show what the others do
 
 
 @click.command(short_help="Save a token on this machine.")
@@ -147,27 +147,27 @@ def publish(
             "With --as public, the method becomes public at once; use --reveal-at only with --as anonymous."
         )
     with connect(url, with_token=True) as client:
-        found = client.own_method(method)
-        if found is None:
+        own_method = client.own_method(method)
+        if own_method is None:
             raise Failure(
                 f"Your team has no method {printable(method)!r}; expected the name or id of one of yours.",
                 exit_code=Exit.USAGE,
                 code="unknown-method",
             )
         if not yes:
-            _confirm(found.name, visibility, client.foreseen(found.id, visibility.upper()))
-        shown = client.show_method(found.id, visibility.upper(), reveal_at=reveal_at)
+            _confirm(own_method.name, visibility, client.foreseen(own_method.id, visibility.upper()))
+        shown = client.show_method(own_method.id, visibility.upper(), reveal_at=reveal_at)
     if as_json:
         echo_json(shown.document)
         return
     called = f', and called "{shown.pseudonym}"' if visibility == "anonymous" and shown.pseudonym else ""
     until = f" until {shown.reveal_at}" if shown.reveal_at else ""
     address = f": {shown.url}" if shown.url else ""
-    click.echo(printable(f"{found.name} is {visibility} now{called}{until}{address}"))
+    click.echo(printable(f"{own_method.name} is {visibility} now{called}{until}{address}"))
 
 
 def _confirm(name: str, visibility: str, foreseen: Foreseen) -> None:
-    """Show what others will see, and ask; where nobody can be asked, say so."""
+    """Show what others will see and ask for confirmation; raises Failure without a terminal."""
     for line in _foreseen_in_words(foreseen):
         click.echo(line, err=True)
     meaning = {
@@ -189,7 +189,7 @@ def _confirm(name: str, visibility: str, foreseen: Foreseen) -> None:
 
 
 def _foreseen_in_words(foreseen: Foreseen) -> Iterator[str]:
-    """What everybody would see: the rows that it would have, and whose ranks would change."""
+    """What everybody would see: the method's rows, and the ranks that would change."""
     from evaluator.cli.values import overall_of, texts_of  # noqa: PLC0415 -- others here need no scores
 
     yield printable(f"Everyone will see {foreseen.name}, team {foreseen.team}:")
@@ -207,12 +207,12 @@ def _foreseen_in_words(foreseen: Foreseen) -> Iterator[str]:
         yield "The method has no scored submission on a board yet."
     for sight in foreseen.splits:
         if sight.moved:
-            told = [
-                f"{row.method} {row.rank_before} to {row.rank_after}" for row in sight.moved[:N_MOVED_TOLD]
+            moves = [
+                f"{row.method} {row.rank_before} to {row.rank_after}" for row in sight.moved[:N_MOVED_SHOWN]
             ]
-            rest = len(sight.moved) - len(told)
+            rest = len(sight.moved) - len(moves)
             more = f", and {rest:,} more" if rest else ""
-            yield printable(f"On {sight.split} other ranks change: {', '.join(told)}{more}.")
+            yield printable(f"On {sight.split} other ranks change: {', '.join(moves)}{more}.")
     yield ""
 
 
@@ -235,7 +235,7 @@ def _quota_in_words(rows: Sequence[Quota]) -> Iterator[str]:
         opens = "now" if row.is_open else row.next_slot_at or "never"
         table.append([Cell(printable(text)) for text in (row.split, left, limit, opens)])
     yield from aligned(table, align="<>><")
-    said = [f"{row.split}: {row.sentence}" for row in rows if row.sentence and not row.is_open]
-    if said:
+    sentences = [f"{row.split}: {row.sentence}" for row in rows if row.sentence and not row.is_open]
+    if sentences:
         yield ""
-        yield from map(printable, said)
+        yield from map(printable, sentences)

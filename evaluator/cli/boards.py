@@ -90,21 +90,21 @@ def board(
             "rows, when you are signed in."
         )
     with connect(url, with_token=mine) as client:
-        found = client.board(split, sort=sort, edition=edition, at=at, has_intervals=has_intervals)
+        split_board = client.board(split, sort=sort, edition=edition, at=at, has_intervals=has_intervals)
         if form not in {"table", "json"}:
             suffix = next(each.suffix for each in FORMATS if each.name == form)
-            text = client.export(found, suffix, sort=sort, at=at, has_intervals=has_intervals)
+            text = client.export(split_board, suffix, sort=sort, at=at, has_intervals=has_intervals)
             click.echo(text.replace("\r\n", "\n"), nl=False)  # as lines end here
             return
     if form == "json":
-        echo_json(found.document)
+        echo_json(split_board.document)
     else:
-        _show(found, is_mine=mine)
+        _show(split_board, is_mine=mine)
 
 
-def _show(found: Board, *, is_mine: bool) -> None:
+def _show(board: Board, *, is_mine: bool) -> None:
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    for line in in_words(found, width=width):
+    for line in in_words(board, width=width):
         click.echo(line)
     if is_mine:
         click.echo(
@@ -113,39 +113,39 @@ def _show(found: Board, *, is_mine: bool) -> None:
         )
 
 
-def in_words(found: Board, *, width: int | None) -> Iterator[str]:
+def in_words(board: Board, *, width: int | None) -> Iterator[str]:
     """The board as lines. Where `width` (cells) is too little for all columns, the main ones stay."""
-    facts = [found.split]
-    if found.edition is not None:
-        facts.append(f"edition {found.edition}")
-    if found.updated:
-        facts.append(f"updated {found.updated}")
+    facts = [board.split]
+    if board.edition is not None:
+        facts.append(f"edition {board.edition}")
+    if board.updated:
+        facts.append(f"updated {board.updated}")
     yield printable(" · ".join(facts))
-    if not found.entries:
+    if not board.entries:
         yield "No results yet. Be the first: tsttc submit --help"
         return
-    yield units(found.score_names)
+    yield units(board.score_names)
     yield ""
-    lines = _table(found, texts=("team", "date"), scores=found.score_names)
+    lines = _table(board, texts=("team", "date"), scores=board.score_names)
     if width is not None and max(width_of(click.unstyle(line)) for line in lines) > width:
-        lines = _table(found, texts=(), scores=overall_of(found.score_names))
+        lines = _table(board, texts=(), scores=overall_of(board.score_names))
         lines += ["", "The terminal is too narrow for all columns; use a pipe or --json."]
     yield from lines
-    if any(entry.intervals for entry in found.entries):
+    if any(entry.intervals for entry in board.entries):
         yield ""
-        yield layouts.brackets(found.unit, found.n_units)
-    if found.floor:
+        yield layouts.brackets(board.unit, board.n_units)
+    if board.floor:
         from evaluator.scoring.scores import floor_sentence  # noqa: PLC0415 -- loads numpy
 
         yield ""
-        yield floor_sentence(found.floor, decimals=found.decimals or 2)
+        yield floor_sentence(board.floor, decimals=board.decimals or 2)
 
 
-def _table(found: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list[str]:
+def _table(board: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list[str]:
     headings = ["rank", "method", *texts, *map(short_name, scores)]
     rows = [[Cell(text, is_bold=True) for text in headings]]
-    marks = {name: _marks_of(found, name) for name in scores}
-    for i, entry in enumerate(found.entries):
+    marks = {name: _marks_of(board, name) for name in scores}
+    for i, entry in enumerate(board.entries):
         ranks = entry.interval(PRIMARY)
         mark = layouts.mark_of(visibility=entry.visibility, pseudonym=entry.pseudonym)
         row = [
@@ -167,7 +167,7 @@ def _table(found: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list
 
 
 def _marks_of(board: Board, name: str) -> tuple[frozenset[int], frozenset[int]]:
-    """The places of the best and the second of a column, among the rows that everybody sees."""
+    """The rows with the best and the second value of a column, among those that everybody sees."""
     from evaluator.metrics.registry import best_and_second  # noqa: PLC0415 -- only once there is a board to mark
 
     return best_and_second(
@@ -176,9 +176,11 @@ def _marks_of(board: Board, name: str) -> tuple[frozenset[int], frozenset[int]]:
 
 
 def _interval_text(entry: BoardEntry, name: str) -> str:
-    """Where a value may lie, to stand behind it; empty where that is not known."""
+    """The confidence interval to append to a value; empty if unknown."""
     from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
-    found = entry.interval(name)
-    low, high = (format_rounded(end, decimals=entry.decimals, missing="") for end in (found.low, found.high))
+    interval = entry.interval(name)
+    low, high = (
+        format_rounded(end, decimals=entry.decimals, missing="") for end in (interval.low, interval.high)
+    )
     return f" [{low}, {high}]" if low and high else ""

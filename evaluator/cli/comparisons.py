@@ -83,12 +83,12 @@ def compare(
                 exit_code=Exit.USAGE,
                 code="bad-comparison",
             )
-        found = client.compare(split, ids)
+        comparison = client.compare(split, ids)
     if as_json:
-        echo_json(found.document)
+        echo_json(comparison.document)
         return
     for line in _server_s_words(
-        found,
+        comparison,
         names=(entries[0].method, entries[1].method),
         scores=(entries[0].scores, entries[1].scores),
     ):
@@ -96,20 +96,20 @@ def compare(
 
 
 def _server_s_words(
-    found: Compared, *, names: tuple[str, str], scores: tuple[Scores, Scores]
+    comparison: Compared, *, names: tuple[str, str], scores: tuple[Scores, Scores]
 ) -> Iterator[str]:
-    edition = f" · edition {found.edition}" if found.edition is not None else ""
-    yield printable(f"{found.split}{edition}")
+    edition = f" · edition {comparison.edition}" if comparison.edition is not None else ""
+    yield printable(f"{comparison.split}{edition}")
     yield units(scores[0])
-    if any(gap.low is not None for gap in found.differences().values()):
-        yield f"95 % confidence intervals and p-values over {in_words(found.unit, found.n_units)}"
+    if any(gap.low is not None for gap in comparison.differences().values()):
+        yield f"95 % confidence intervals and p-values over {in_words(comparison.unit, comparison.n_units)}"
     yield ""
-    yield from table(names, scores, found.differences(), decimals=found.decimals)
-    said = found.pairs[0].sentence if found.pairs else ""
-    if said or found.reason:
+    yield from table(names, scores, comparison.differences(), decimals=comparison.decimals)
+    pair_sentence = comparison.pairs[0].sentence if comparison.pairs else ""
+    if pair_sentence or comparison.reason:
         yield ""
-        yield printable(said or found.reason)
-    yield from filter(None, (others(found.differences()),))
+        yield printable(pair_sentence or comparison.reason)
+    yield from filter(None, (others(comparison.differences()),))
 
 
 def _compare_files(first: Path, second: Path, truth_path: Path, *, unit: str | None, as_json: bool) -> None:
@@ -124,15 +124,15 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, unit: str | N
             predictions = read_predictions(predictions_of(path), manifest=truth.manifest)
             read.append(predictions)
             reports.append(evaluate(predictions, truth))
-    found = compare_predictions(read[0], read[1], truth, unit=taken.kind)
+    differences = compare_predictions(read[0], read[1], truth, unit=taken.kind)
     if as_json:
-        differences = {
+        documents = {
             name: {
                 **asdict(gap),
                 "is_significant": gap.is_significant,
                 "detectable_difference": rounded(gap.detectable_difference),
             }
-            for name, gap in found.items()
+            for name, gap in differences.items()
         }
         echo_json(
             {
@@ -140,29 +140,29 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, unit: str | N
                 "second": reports[1].as_dict(),
                 "unit": taken.kind,
                 "n_units": len(taken),
-                "differences": differences,
+                "differences": documents,
             }
         )
         return
-    for line in table((str(first), str(second)), (reports[0].flat(), reports[1].flat()), found):
+    for line in table((str(first), str(second)), (reports[0].flat(), reports[1].flat()), differences):
         click.echo(line)
     click.echo("")
     click.echo(units(reports[0].flat()))
-    if any(gap.low is not None for gap in found.values()):
+    if any(gap.low is not None for gap in differences.values()):
         click.echo(f"95 % confidence intervals and p-values over {taken}")
     names = str(first), str(second)
-    if PRIMARY in found:
-        click.echo(printable(sentence(*names, name=PRIMARY, found=found[PRIMARY])))
-        if rests_on := influence(*names, found=found[PRIMARY]):
+    if PRIMARY in differences:
+        click.echo(printable(sentence(*names, name=PRIMARY, difference=differences[PRIMARY])))
+        if rests_on := influence(*names, difference=differences[PRIMARY]):
             click.echo(printable(rests_on))
-    if lead := others(found):
+    if lead := others(differences):
         click.echo(lead)
 
 
 def table(
     names: tuple[str, str],
     scores: tuple[Scores, Scores],
-    found: Mapping[str, Difference],
+    differences: Mapping[str, Difference],
     *,
     decimals: int = 2,
 ) -> list[str]:
@@ -176,10 +176,10 @@ def table(
         rows.append([Cell(printable(name)), *map(Cell, texts)])
 
     def column(kind: str) -> list[Cell]:
-        values = [rounded(getattr(found.get(name), kind, None), decimals=decimals) for name in columns]
+        values = [rounded(getattr(differences.get(name), kind, None), decimals=decimals) for name in columns]
         return [Cell(NO_VALUE if value is None else f"{value:+.{decimals}f}") for value in values]
 
-    gaps = [found.get(name) for name in columns]
+    gaps = [differences.get(name) for name in columns]
     chances = [NO_VALUE if gap is None else p_cell(gap.p, gap.p_below) or NO_VALUE for gap in gaps]
 
     rows += [

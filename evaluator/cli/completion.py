@@ -22,9 +22,9 @@ def completion(context: click.Context, shell: str) -> None:
     """
     from click.shell_completion import get_completion_class  # noqa: PLC0415 -- needed here alone
 
-    found = get_completion_class(shell)
-    assert found is not None  # noqa: S101 -- click knows these three
+    completion_class = get_completion_class(shell)
+    assert completion_class is not None  # noqa: S101 -- click knows these three
     root = context.find_root()
-    maker = found(root.command, {}, root.info_name or "tsttc", VARIABLE)
+    maker = completion_class(root.command, {}, root.info_name or "tsttc", VARIABLE)
     # Not `source()`: that asks bash for its version, and this may be written for another machine's.
     click.echo(maker.source_template % maker.source_vars())

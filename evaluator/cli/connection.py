@@ -48,10 +48,10 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
     if bearer and site.scheme == "http" and site.hostname not in LOOPBACK_HOSTS:
         click.echo(f"Warning: the token goes to {url} unencrypted; use https where you can.", err=True)
     # A job may begin before its server has; a person who mistyped an address wants to hear of it at once.
-    patience = RetryPolicy(n_first_tries=1) if sys.stderr.isatty() else RetryPolicy()
+    retry_policy = RetryPolicy(n_first_tries=1) if sys.stderr.isatty() else RetryPolicy()
     agent = f"tsttc/{version()}"
     try:
-        with Client(url=url, token=bearer, user_agent=agent, patience=patience) as client:
+        with Client(url=url, token=bearer, user_agent=agent, retry_policy=retry_policy) as client:
             if bearer:
                 client.require_leaderboard()
             try:
@@ -107,7 +107,7 @@ def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
             code, words = "cut-off", f"{error.url} gave an incomplete answer ({error.reason})."
             hint = "Run the command again: the same file never counts twice."
         case BadAnswer():
-            code, words = "bad-answer", f"{error.url} did not answer like a leaderboard: {error.found}."
+            code, words = "bad-answer", f"{error.url} did not answer like a leaderboard: {error.content}."
         case TimedOut():
             last = f" It was {error.submission.state} last." if error.submission else ""
             exit_code, code, words = Exit.TIMEOUT, "timeout", f"{_sentence(str(error))}{last}"
@@ -155,7 +155,7 @@ def exit_code_of(error: Refused) -> Exit:
 
 
 def _words_for(error: Refused) -> str:
-    """For answers that are no problem document: whatever stands in between may have given them."""
+    """The message for an answer that is no problem document, such as a proxy's."""
     if error.status >= 500:
         return f"The server failed ({error.status}: {error.title}). This is not your fault."
     if error.status in {401, 403}:

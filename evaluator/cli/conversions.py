@@ -66,7 +66,7 @@ def convert(
     data = predictions_of(predictions)
     with naming(predictions):
         try:
-            found = converted(
+            encoded = converted(
                 data,
                 to=to,
                 frame_gap=frame_gap,
@@ -76,8 +76,8 @@ def convert(
         except ValueError as fault:
             raise click.UsageError(str(fault)) from None
     if output is None:
-        click.echo(found)
+        click.echo(encoded)
         return
-    write_bytes(output, found)
+    write_bytes(output, encoded)
     unit = "seconds" if to == "ttc" else "scale ratios"
     click.echo(f"{output}: {unit}{' by natural key' if natural_keys is not None else ''}.")

@@ -49,13 +49,13 @@ class Condition:
         return f"{self.name} {self.operator} {self.number:g}"
 
     def holds(self, scores: Scores) -> bool | None:
-        """Whether it holds; None where there is no such value."""
+        """Whether the condition holds; None if there is no such value."""
         value = scores.get(self.name)
         return None if value is None else OPERATORS[self.operator](round(value, 2), self.number)
 
 
 def parse(text: str) -> list[Condition]:
-    """The conditions of which one is enough; raises `ValueError` that says what was expected where.
+    """Parse alternative conditions; raises `ValueError` that says what was expected where.
 
     >>> [str(condition) for condition in parse("MiD > 15 or RTE_n > 7")]
     ['mid > 15', 'rte_negative > 7']
@@ -67,17 +67,17 @@ def parse(text: str) -> list[Condition]:
 
 
 def _condition(text: str) -> Condition:
-    found = _CONDITION.fullmatch(text)
-    if found is None:
+    match = _CONDITION.fullmatch(text)
+    if match is None:
         shown = text.strip() or "nothing"
         joined = "; several are joined by or" if " and " in text else ""
         raise ValueError(f"found {shown!r}, expected NAME OPERATOR NUMBER, such as mid > 15.0{joined}")
     # As tables write them, too: MiD, MiD_c.
     called = {spelt.lower(): name for name in known_names() for spelt in (short_name(name), name)}
-    name = called.get(found["name"].lower())
+    name = called.get(match["name"].lower())
     if name is None:
-        raise ValueError(f"found {found['name']!r}, expected one of {', '.join(known_names())}")
-    return Condition(name, found["operator"], float(found["number"]))
+        raise ValueError(f"found {match['name']!r}, expected one of {', '.join(known_names())}")
+    return Condition(name, match["operator"], float(match["number"]))
 
 
 def fail_if_option(command: Command) -> Command:
@@ -102,27 +102,27 @@ def _conditions(
 
 
 def judge(conditions: Sequence[Condition], scores: Scores | None, *, decimals: int = 2) -> None:
-    """Raise Failure if one of the conditions holds, or cannot be told: no value is no pass."""
+    """Raise Failure if one of the conditions holds or has no value."""
     known: Scores = scores or {}
     missing = [condition for condition in conditions if condition.holds(known) is None]
     holding = [condition for condition in conditions if condition.holds(known)]
     if holding:
-        said = "; ".join(f"{c.name} is {known[c.name]:.{decimals}f}, which matches {c}" for c in holding)
-        raise Failure(f"The gate fails: {said}.", exit_code=Exit.GATE, code="gate-failed")
+        matches = "; ".join(f"{c.name} is {known[c.name]:.{decimals}f}, which matches {c}" for c in holding)
+        raise Failure(f"The gate fails: {matches}.", exit_code=Exit.GATE, code="gate-failed")
     if missing:
         names = ", ".join(dict.fromkeys(condition.name for condition in missing))
         raise undecided(f"there is no value for {names}")
 
 
-def told(
+def show_and_judge(
     document: Mapping[str, Any], *, show: Callable[[], None], judge: Callable[[], None], as_json: bool
 ) -> None:
-    """Show a result, and raise what `judge` raises; as JSON, `document`, the two are one."""
+    """Show a result and raise what `judge` raises; as JSON, one document has both."""
     failure = None
     try:
         judge()
-    except Failure as found:
-        failure = found
+    except Failure as raised:
+        failure = raised
     if as_json and failure is None:
         echo_json(document)
     elif not as_json:
@@ -185,12 +185,12 @@ def rival(client: Client, *, split: str, method: str, own: str) -> BoardEntry | 
     return entry
 
 
-def judge_against(found: BoardEntry, *, mid: float | None, decimals: int = 2) -> None:
+def judge_against(entry: BoardEntry, *, mid: float | None, decimals: int = 2) -> None:
     """Raise Failure if MiD is worse than the other method's."""
-    other = found.scores[PRIMARY]
+    other = entry.scores[PRIMARY]
     if mid is None or other is None:
         raise undecided("there is no value for mid")
     if mid > other:
-        name = printable(found.method)
-        words = f"MiD is {mid:.{decimals}f}, and {name} has {other:.{found.decimals}f}"
+        name = printable(entry.method)
+        words = f"MiD is {mid:.{decimals}f}, and {name} has {other:.{entry.decimals}f}"
         raise Failure(f"The gate fails: {words}.", exit_code=Exit.GATE, code="gate-failed")

@@ -17,7 +17,7 @@ GAP = "  "
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """The text of one cell and how it stands out on a terminal."""
+    """The text of one cell and its emphasis on a terminal."""
 
     text: str
     is_bold: bool = False
@@ -35,16 +35,16 @@ def short_name(score: str) -> str:
 
 
 def units(scores: Iterable[str]) -> str:
-    """What the headings of these scores mean.
+    """The units and TTC ranges of these scores' headings.
 
     >>> units(["mid", "mid_crucial", "mid_negative", "rte"])
     'MiD ×10⁻⁴, RTE %, lower is better; TTC ranges in s: c 0–3, n −20–0'
     """
     groups = grouped_names(scores)
-    found = dict.fromkeys(range_of(name) for names in groups.values() for name in names)
-    ranges = ", ".join(f"{ttc_range.letter} {ttc_range.ends}" for ttc_range in found if ttc_range)
-    said = f"{', '.join(metric.heading for metric in groups)}, lower is better"
-    return f"{said}; TTC ranges in s: {ranges}" if ranges else said
+    ttc_ranges = dict.fromkeys(range_of(name) for names in groups.values() for name in names)
+    ranges = ", ".join(f"{ttc_range.letter} {ttc_range.ends}" for ttc_range in ttc_ranges if ttc_range)
+    metrics = f"{', '.join(metric.heading for metric in groups)}, lower is better"
+    return f"{metrics}; TTC ranges in s: {ranges}" if ranges else metrics
 
 
 def printable(text: str) -> str:

@@ -57,14 +57,14 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
 
     sequences, numbering = _sequences(manifest_path, annotations)
     with naming(predictions):
-        found = read_predictions(predictions_of(predictions), manifest=sequences)
-    warnings = warnings_of(found)
+        parsed = read_predictions(predictions_of(predictions), manifest=sequences)
+    warnings = warnings_of(parsed)
     if numbering is not None and annotations is not None:
-        warnings += numbering_warnings(numbering, found, predictions=predictions, annotations=annotations)
+        warnings += numbering_warnings(numbering, parsed, predictions=predictions, annotations=annotations)
     if as_json:
         echo_json(
             {
-                "predictions_digest": found.digest,
+                "predictions_digest": parsed.digest,
                 "manifest_digest": sequences.digest,
                 "n_sequences": sequences.n_sequences,
                 "n_renumbered": None if numbering is None else numbering.n_renumbered,
@@ -137,8 +137,7 @@ def manifest(
         raise click.UsageError("Give either TRUTH_OR_FOLDER or --split.")
     if edition is not None and split is None:
         raise click.UsageError("--edition needs --split.")
-    found = _manifest_of_split(str(split), edition, url) if truth is None else _manifest_of(truth)
-    table, numbering = found
+    table, numbering = _manifest_of_split(str(split), edition, url) if truth is None else _manifest_of(truth)
     if output is not None:
         if truth is not None and output.exists() and output.samefile(truth):
             raise click.BadParameter("this is the ground truth itself; choose another file.", param_hint="-o")
@@ -152,7 +151,7 @@ def manifest(
 
 
 def _manifest_of_split(split: str, edition: int | None, url: str) -> tuple[Manifest, Numbering | None]:
-    """What the leaderboard gives, checked."""
+    """Get the manifest of a split from the leaderboard and check it."""
     from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
 
     with connect(url, with_token=False) as client, naming(Path(f"{url.rstrip('/')}: {split}")):
@@ -188,18 +187,18 @@ def truth(*, folder: Path, output: Path | None, as_json: bool) -> None:
     from evaluator import read_truth  # noqa: PLC0415 -- numpy, as above
 
     with naming(folder):
-        found = read_truth(folder)
+        ground_truth = read_truth(folder)
     if output is not None:
         if output.exists() and output.samefile(folder):
             raise click.BadParameter("this is the ground truth itself; choose another file.", param_hint="-o")
-        write_bytes(output, found.to_csv())
+        write_bytes(output, ground_truth.to_csv())
     document = {
-        "truth_digest": found.digest,
-        "manifest_digest": found.manifest.digest,
-        "n_sequences": found.n_sequences,
-        "n_recordings": found.manifest.n_recordings,
+        "truth_digest": ground_truth.digest,
+        "manifest_digest": ground_truth.manifest.digest,
+        "n_sequences": ground_truth.n_sequences,
+        "n_recordings": ground_truth.manifest.n_recordings,
     }
-    _tell_table(found, document, manifest=found.manifest, output=output, as_json=as_json)
+    _tell_table(ground_truth, document, manifest=ground_truth.manifest, output=output, as_json=as_json)
 
 
 def _tell_table(

@@ -85,7 +85,7 @@ def timeout_option(command: Command) -> Command:
 
 
 def slug(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
-    """A name that stands in an address: letters, digits, hyphens and underscores."""
+    """Check a name for use in an address: letters, digits, hyphens and underscores."""
     if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", value):
         raise click.BadParameter(f"found {value!r}, expected letters, digits, hyphens and underscores alone.")
     return value

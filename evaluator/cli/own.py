@@ -34,16 +34,16 @@ def whoami(*, url: str, as_json: bool) -> None:
       tsttc whoami
     """
     with connect(url, with_token=True) as client:
-        found = client.account()
+        account = client.account()
     if as_json:
-        echo_json(found.document)
+        echo_json(account.document)
         return
-    team = f"team {found.team}" if found.team else "no team yet"
-    limit = f", for {found.split} only" if found.split else ""
-    moment = found.expires_at
+    team = f"team {account.team}" if account.team else "no team yet"
+    limit = f", for {account.split} only" if account.split else ""
+    moment = account.expires_at
     end = f"until {moment[:16].replace('T', ' ')} UTC" if moment else "without an end"
     click.echo(printable(f"{team} at {url.rstrip('/')}"))
-    click.echo(printable(f'token "{found.token}": {" and ".join(found.scopes)}{limit}, {end}'))
+    click.echo(printable(f'token "{account.token}": {" and ".join(account.scopes)}{limit}, {end}'))
 
 
 @click.command(short_help="List the methods of your team.")
@@ -57,15 +57,15 @@ def methods(*, url: str, as_json: bool) -> None:
       tsttc methods
     """
     with connect(url, with_token=True) as client:
-        found = list(client.methods())
+        own_methods = list(client.methods())
     if as_json:
-        echo_json([method.document for method in found])
+        echo_json([method.document for method in own_methods])
         return
-    if not found:
+    if not own_methods:
         click.echo("Your team has no methods yet; tsttc submit creates one.")
         return
     table = [[Cell(text, is_bold=True) for text in ("id", "method", "visibility")]]
-    for method in found:
+    for method in own_methods:
         called = f" as {method.pseudonym}" if method.visibility == "ANONYMOUS" and method.pseudonym else ""
         seen = f"{method.visibility.lower()}{called}"
         table.append([Cell(printable(text)) for text in (method.id, method.name, seen)])
@@ -103,24 +103,25 @@ def list_submissions(*, split: str | None, method: str | None, limit: int, url: 
             for each in client.submissions()
             if split in {None, each.split} and method in {None, each.method, each.method_id}
         )
-        found = list(itertools.islice(wanted, limit))
+        submissions = list(itertools.islice(wanted, limit))
     if as_json:
-        echo_json([submission.document for submission in found])
+        echo_json([submission.document for submission in submissions])
         return
-    if not found:
-        told = "Your team has no submissions yet." if split is method is None else "There are none of these."
-        click.echo(told)
+    if not submissions:
+        click.echo(
+            "Your team has no submissions yet." if split is method is None else "There are none of these."
+        )
         return
-    for line in _table(found):
+    for line in _table(submissions):
         click.echo(line)
 
 
-def _table(found: Sequence[Submission]) -> list[str]:
+def _table(submissions: Sequence[Submission]) -> list[str]:
     from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     heads = ("id", "submitted", "split", "method", "state", short_name(PRIMARY))
     table = [[Cell(text, is_bold=True) for text in heads]]
-    for each in found:
+    for each in submissions:
         mid = (each.scores or {}).get(PRIMARY)
         texts = (
             each.id,
@@ -149,10 +150,10 @@ def withdraw(*, submission_id: str, yes: bool, url: str, as_json: bool) -> None:
       tsttc withdraw 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11
     """
     with connect(url, with_token=True) as client:
-        found = client.submission(submission_id)
-        named = printable(f"{found.method} on {found.split}")
+        submission = client.submission(submission_id)
+        named = printable(f"{submission.method} on {submission.split}")
         if not yes:
-            _confirm(f"This withdraws {named}, state {found.state}; it cannot be undone.")
+            _confirm(f"This withdraws {named}, state {submission.state}; it cannot be undone.")
         done = client.withdraw(submission_id)
     if as_json:
         echo_json(done.document)

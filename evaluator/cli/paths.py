@@ -18,10 +18,10 @@ def settings_file() -> Path:
 def server_of_login() -> str | None:
     """The address that `tsttc login` was last given; None where there was none, or it cannot be read."""
     try:
-        found = json.loads(settings_file().read_text(encoding="utf-8-sig"))
+        settings = json.loads(settings_file().read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RuntimeError):  # no file, no JSON, no home directory
         return None
-    server = found.get("server") if isinstance(found, dict) else None
+    server = settings.get("server") if isinstance(settings, dict) else None
     return server if isinstance(server, str) else None
 
 

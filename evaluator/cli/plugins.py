@@ -18,7 +18,7 @@ GROUP: Final = "tsttc.commands"
 
 
 @cache
-def found() -> dict[str, EntryPoint]:
+def commands() -> dict[str, EntryPoint]:
     """The entry points by name."""
     from importlib.metadata import entry_points  # noqa: PLC0415 -- takes as long as the rest of --help
 

@@ -40,7 +40,7 @@ def units_asked(truth: GroundTruth, unit: str | None) -> Units:
 
 
 def name_of(path: Path) -> str:
-    """What a file is called in a sentence."""
+    """The name of a file for a sentence."""
     return "standard input" if str(path) == "-" else str(path)
 
 

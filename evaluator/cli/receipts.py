@@ -78,35 +78,37 @@ def verify(*, receipt_path: Path, keys_path: Path | None, url: str, as_json: boo
         with connect(url, with_token=False) as client:
             keys_data = client.receipt_keys()
     try:
-        found = verified_by(data, read_keys(keys_data))
+        receipt = verified_by(data, read_keys(keys_data))
     except NotVerified as fault:
         raise Failure(str(fault), exit_code=Exit.REJECTED, code=fault.code) from None
-    is_elsewhere = keys_path is None and urlsplit(found.site).netloc != urlsplit(url).netloc
+    is_elsewhere = keys_path is None and urlsplit(receipt.site).netloc != urlsplit(url).netloc
     if as_json:
-        echo_json({name: getattr(found, name) for name in found.__dataclass_fields__})
+        echo_json({name: getattr(receipt, name) for name in receipt.__dataclass_fields__})
     else:
-        for line in _in_words(found):
+        for line in _in_words(receipt):
             click.echo(line)
     if is_elsewhere:
-        click.echo(f"Note: the receipt names {printable(found.site)}; the keys are those of {url}.", err=True)
+        click.echo(
+            f"Note: the receipt names {printable(receipt.site)}; the keys are those of {url}.", err=True
+        )
 
 
-def _in_words(found: Verified) -> Iterator[str]:
+def _in_words(receipt: Verified) -> Iterator[str]:
     facts = {
-        "signed by": found.site,
-        "scored": found.scored_at,
-        "method": f"{found.method_id}, named {found.method} when signed",
-        "submission": found.submission,
-        "split": f"{found.split}, edition {found.edition}, {found.protocol}",
-        "truth": found.ground_truth,
-        "predictions": found.file,
-        "key": found.key_id,
+        "signed by": receipt.site,
+        "scored": receipt.scored_at,
+        "method": f"{receipt.method_id}, named {receipt.method} when signed",
+        "submission": receipt.submission,
+        "split": f"{receipt.split}, edition {receipt.edition}, {receipt.protocol}",
+        "truth": receipt.ground_truth,
+        "predictions": receipt.file,
+        "key": receipt.key_id,
     }
     yield "The receipt is valid."
     yield ""
     for name, text in facts.items():
         yield printable(f"{name:<12} {text}")
     yield ""
-    yield from score_table(found.scores, counts=found.counts, decimals=found.decimals)
+    yield from score_table(receipt.scores, counts=receipt.counts, decimals=receipt.decimals)
     yield ""
-    yield units(found.scores)
+    yield units(receipt.scores)

@@ -131,22 +131,22 @@ def score(
     if unit is not None and not with_intervals:
         raise click.UsageError("--unit is that of intervals; add --intervals.")
     truth = _truth(truth_path)
-    found = list(_scored(predictions, truth, protocol=protocol))
+    scored_files = list(_scored(predictions, truth, protocol=protocol))
     taken = units_asked(truth, unit) if with_intervals else None
-    rows = [row for one in found for row in _rows(one, by=by, taken=taken)]
+    rows = [row for one in scored_files for row in _rows(one, by=by, taken=taken)]
     if not as_json:
-        for one in found:
-            _warn(one, alone=len(found) == 1)
+        for one in scored_files:
+            _warn(one, alone=len(scored_files) == 1)
     if per_sequence is not None:
-        write_bytes(per_sequence, _per_sequence(found), option="--per-sequence")
+        write_bytes(per_sequence, _per_sequence(scored_files), option="--per-sequence")
     if taken and not as_json and not any(any(row.intervals.values()) for row in rows):
         few = f"one needs 8 {in_words(taken.kind)} of equal size, or more of unequal size"
         click.echo(f"There are no confidence intervals: {few}.", err=True)
-    tabular = by is not None or with_intervals or len(found) > 1
-    gates.told(
-        _document(found, rows if tabular else [], by=by, taken=taken),
-        show=lambda: click.echo(_shown(found, rows, by=by, form=form), nl=False),
-        judge=lambda: _judge(fail_if, found),
+    tabular = by is not None or with_intervals or len(scored_files) > 1
+    gates.show_and_judge(
+        _document(scored_files, rows if tabular else [], by=by, taken=taken),
+        show=lambda: click.echo(_shown(scored_files, rows, by=by, form=form), nl=False),
+        judge=lambda: _judge(fail_if, scored_files),
         as_json=as_json,
     )
 
@@ -202,13 +202,13 @@ def plot(
         raise click.BadParameter(
             f"found {output.name!r}, expected a name that ends in {expected}.", param_hint="-o"
         )
-    found = list(_scored(predictions, _truth(truth_path), protocol=protocol))
-    for one in found:
-        _warn(one, alone=len(found) == 1)
-    names = [Path(one.name).stem for one in found]
+    scored_files = list(_scored(predictions, _truth(truth_path), protocol=protocol))
+    for one in scored_files:
+        _warn(one, alone=len(scored_files) == 1)
+    names = [Path(one.name).stem for one in scored_files]
     if len(set(names)) < len(names):
-        names = [one.name for one in found]
-    details = [one.report.require_details() for one in found]
+        names = [one.name for one in scored_files]
+    details = [one.report.require_details() for one in scored_files]
     try:
         plots.draw(kind, dict(zip(names, details, strict=True)), path=output)
     except OSError as error:
@@ -244,9 +244,9 @@ def _scored(paths: Sequence[Path], truth: GroundTruth, *, protocol: str) -> Iter
         )
 
 
-def _rows(found: _Scored, *, by: str | None, taken: Units | None) -> Iterator[ResultRow]:
+def _rows(scored: _Scored, *, by: str | None, taken: Units | None) -> Iterator[ResultRow]:
     """The rows of one file; with intervals over the units that are `taken`."""
-    report, drawn = found.report, "" if taken is None else str(taken)
+    report, drawn = scored.report, "" if taken is None else str(taken)
     if by is not None:
         try:
             groups = report.breakdown(by, with_intervals=bool(taken), unit=taken.kind if taken else None)
@@ -254,10 +254,12 @@ def _rows(found: _Scored, *, by: str | None, taken: Units | None) -> Iterator[Re
             raise click.BadParameter(str(fault), param_hint="--by") from None
         for one in groups:
             ends = one.intervals if taken else {}
-            yield ResultRow(found.name, one.group, one.n_sequences, one.n_recordings, one.scores, ends, drawn)
+            yield ResultRow(
+                scored.name, one.group, one.n_sequences, one.n_recordings, one.scores, ends, drawn
+            )
         return
     yield ResultRow(
-        found.name,
+        scored.name,
         None,
         report.n_sequences,
         report.require_details().truth.manifest.n_recordings,
@@ -276,18 +278,18 @@ def _intervals(report: Report, taken: Units) -> dict[str, tuple[float, float] | 
     )
 
 
-def _warn(found: _Scored, *, alone: bool) -> None:
-    if found.warnings and not alone:
-        click.echo(f"{printable(found.name)}:", err=True)
-    echo_warnings(found.warnings)
+def _warn(scored: _Scored, *, alone: bool) -> None:
+    if scored.warnings and not alone:
+        click.echo(f"{printable(scored.name)}:", err=True)
+    echo_warnings(scored.warnings)
 
 
 def _document(
-    found: Sequence[_Scored], rows: Sequence[ResultRow], *, by: str | None, taken: Units | None
+    scored_files: Sequence[_Scored], rows: Sequence[ResultRow], *, by: str | None, taken: Units | None
 ) -> dict[str, Any]:
-    """One file is its own document; several are listed as `files`. What was asked for beside is added."""
+    """The document of one file, or of several as `files`, with the groups and intervals asked for."""
     documents: list[dict[str, Any]] = []
-    for one in found:
+    for one in scored_files:
         document = one.document()
         own = [row for row in rows if row.file == one.name]
         if by is not None:
@@ -300,7 +302,7 @@ def _document(
         documents.append(document)
     if len(documents) == 1:
         return documents[0]
-    return {"files": [{"file": one.name, **each} for one, each in zip(found, documents, strict=True)]}
+    return {"files": [{"file": one.name, **each} for one, each in zip(scored_files, documents, strict=True)]}
 
 
 def _group_document(row: ResultRow) -> dict[str, Any]:
@@ -313,13 +315,13 @@ def _group_document(row: ResultRow) -> dict[str, Any]:
     }
 
 
-def _shown(found: Sequence[_Scored], rows: Sequence[ResultRow], *, by: str | None, form: str) -> str:
+def _shown(scored_files: Sequence[_Scored], rows: Sequence[ResultRow], *, by: str | None, form: str) -> str:
     if form != "table":
         return WRITERS[form](rows, by=by)
-    if by is None and len(found) == 1:
-        lines = list(_in_words(found[0].report, rows[0]))
+    if by is None and len(scored_files) == 1:
+        lines = list(_in_words(scored_files[0].report, rows[0]))
     else:
-        lines = [*_table(rows, by=by), "", units(rows[0].scores), _counts_in_words(found[0].report)]
+        lines = [*_table(rows, by=by), "", units(rows[0].scores), _counts_in_words(scored_files[0].report)]
         lines += [f"95 % confidence intervals; bootstrap over {rows[0].units}"] if rows[0].units else []
     return "".join(f"{line}\n" for line in lines)
 
@@ -367,26 +369,26 @@ def _counts_in_words(report: Report) -> str:
     )
 
 
-def _per_sequence(found: Sequence[_Scored]) -> bytes:
+def _per_sequence(scored_files: Sequence[_Scored]) -> bytes:
     from evaluator.tables.formats import csv_lines  # noqa: PLC0415 -- needed here alone
 
-    tables = [one.report.records() for one in found]
+    tables = [one.report.records() for one in scored_files]
     columns = ["file", *tables[0]]
     records = (
         dict(zip(columns, (one.name, *values), strict=True))
-        for one, table in zip(found, tables, strict=True)
+        for one, table in zip(scored_files, tables, strict=True)
         for values in zip(*table.values(), strict=True)
     )
     return "".join(csv_lines(records, columns=columns)).encode()
 
 
-def _judge(conditions: list[gates.Condition], found: Sequence[_Scored]) -> None:
-    """The gate of every file; the first that fails is told by its name where there are several."""
-    for one in found:
+def _judge(conditions: list[gates.Condition], scored_files: Sequence[_Scored]) -> None:
+    """Raise for the first file that fails the gate; with several files, the message names it."""
+    for one in scored_files:
         try:
             gates.judge(conditions, one.report.flat())
         except Failure as failure:
-            if len(found) > 1:
+            if len(scored_files) > 1:
                 failure.message = f"{printable(one.name)}: {failure.message}"
                 failure.document["title"] = failure.message
             raise

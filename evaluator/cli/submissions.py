@@ -194,34 +194,34 @@ def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> fro
     except Rejected as fault:
         raise rejected(f"the server's manifest of {split}", fault) from None
     try:
-        found = read_predictions(data, manifest=manifest)
+        predictions = read_predictions(data, manifest=manifest)
     except Rejected as fault:
         hint = "Nothing was submitted; your quota is not used."
         raise rejected(name_of(path), fault, hint=hint) from None
-    warnings = warnings_of(found)
+    warnings = warnings_of(predictions)
     echo_warnings(warnings)
     return frozenset(warning.code for warning in warnings)
 
 
 def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submission:
-    """The submission when it is final; until then standard error tells each state."""
-    told = ""
+    """Wait until the submission is final; print each new state to standard error."""
+    last_state = ""
     for submission in client.watch(submission_id, timeout_s=timeout_s):
-        if submission.state != told and not submission.is_final:
+        if submission.state != last_state and not submission.is_final:
             click.echo(state_in_words(submission), err=True)
-            told = submission.state
+            last_state = submission.state
     return submission
 
 
 def _notice_of(client: Client, method: str) -> str:
-    """Who will see the results, in the server's words; empty where only the team will, or nobody may say."""
+    """Who will see the scores, in the server's words; empty if only the team, or the token may not ask."""
     from evaluator.client.answers import Refused  # noqa: PLC0415 -- loads msgspec
 
     try:
-        found = client.own_method(method)
+        own_method = client.own_method(method)
     except Refused:  # a token that may only submit; the answer to the file says it
         return ""
-    return found.notice if found is not None else ""
+    return own_method.notice if own_method is not None else ""
 
 
 def _warn(notice: str, *, err: bool) -> None:
@@ -230,7 +230,7 @@ def _warn(notice: str, *, err: bool) -> None:
 
 
 def _require_consent() -> None:
-    """Ask the person at the terminal. A job is not asked: somebody set it up to send this."""
+    """Ask the person at the terminal; a job without a terminal is not asked."""
     if sys.stdin.isatty() and not click.confirm("Submit?", err=True):
         raise Failure("Nothing was submitted.", exit_code=Exit.USAGE, code="not-confirmed")
 
@@ -266,8 +266,8 @@ def conclude(
     match submission.state:
         case "REJECTED":
             n_problems = submission.n_problems or len(submission.problems)
-            told = n_problems_in_words(n_problems, n_lines=len(submission.problems))
-            message, exit_code = f"The file is rejected: {told}.", Exit.REJECTED
+            count_text = n_problems_in_words(n_problems, n_lines=len(submission.problems))
+            message, exit_code = f"The file is rejected: {count_text}.", Exit.REJECTED
             hint = "Your quota is not used. Check a corrected file with: tsttc check"
         case "SYSTEM_ERROR":
             message, exit_code = (
@@ -278,7 +278,7 @@ def conclude(
         case "CANCELLED":
             message, exit_code, hint = f"{named} was cancelled, so it has no scores.", Exit.REFUSED, ""
         case _:
-            gates.told(
+            gates.show_and_judge(
                 submission.document,
                 show=partial(_show, submission, named, warned),
                 judge=judge,

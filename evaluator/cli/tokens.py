@@ -41,7 +41,7 @@ def token_for(url: str) -> str:
 
 
 def has_token(url: str) -> bool:
-    """Whether there is a token, for commands that can do without."""
+    """Whether there is a token, for commands that also work without one."""
     is_named = os.environ.get(TOKEN_VARIABLE, "").strip() or os.environ.get(TOKEN_FILE_VARIABLE)
     return bool(is_named) or kept_token(url) is not None
 
@@ -75,15 +75,15 @@ def _no_token(words: str, url: str) -> Failure:
 
 
 def kept_token(url: str) -> str | None:
-    """What the keyring has for `url`, or the file; None also where the keyring stays locked."""
+    """The token for `url` in the keyring or the file; None also if the keyring stays locked."""
     from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
 
     backend = usable_keyring()
-    found = None
+    token = None
     if backend is not None:
         with suppress(KeyringError, OSError):
-            found = backend.get_password(SERVICE, account(url))
-    return found or _kept_in_file().get(account(url))
+            token = backend.get_password(SERVICE, account(url))
+    return token or _kept_in_file().get(account(url))
 
 
 def keep_token(url: str, token: str) -> str:
@@ -133,21 +133,21 @@ def usable_keyring() -> KeyringBackend | None:
 
 
 def tokens_file() -> Path:
-    """The file of tokens by server, beside that of settings."""
+    """The file of tokens by server, next to that of settings."""
     return settings_file().with_name("tokens.json")
 
 
 def _kept_in_file() -> dict[str, str]:
     """The tokens of the file; none where there is none, or it is not what was written."""
     try:
-        found = json.loads(tokens_file().read_text(encoding="utf-8-sig"))
+        tokens = json.loads(tokens_file().read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RuntimeError):  # no file, no JSON, no home directory
         return {}
-    return {str(name): str(token) for name, token in found.items()} if isinstance(found, dict) else {}
+    return {str(name): str(token) for name, token in tokens.items()} if isinstance(tokens, dict) else {}
 
 
 def _keep_in_file(kept: dict[str, str]) -> str:
-    """Write the file so that nobody else could ever read it; gives its name. Without tokens there is none."""
+    """Write the file, readable for its owner only, and return its name; without tokens, delete it."""
     path = tokens_file()
     try:
         if not kept:

@@ -20,7 +20,7 @@ def authors_or_team(entry: BoardEntry) -> str:
 
 
 def overall_of(names: Iterable[str]) -> list[str]:
-    """Of these scores the overall ones, each once.
+    """The overall scores among these, each once.
 
     >>> overall_of(["mid", "mid_small", "rte", "mid"])
     ['mid', 'rte']
@@ -47,10 +47,10 @@ def state_in_words(submission: Submission) -> str:
 
 
 def in_short(submission: Submission) -> Iterator[str]:
-    """Where a scored submission stands, and the intervals of its overall errors, if known."""
+    """The rank of a scored submission, and the intervals of its overall errors, if known."""
     if submission.rank is not None:
-        found = submission.intervals.get(PRIMARY)
-        low, high = (found.rank_low, found.rank_high) if found else (None, None)
+        interval = submission.intervals.get(PRIMARY)
+        low, high = (interval.rank_low, interval.rank_high) if interval else (None, None)
         would_be = "if published: " if submission.visibility == "PRIVATE" else ""
         rank = layouts.rank_text(submission.rank, low=low, high=high)
         yield f"{would_be}rank {rank}"
@@ -73,11 +73,13 @@ def in_short(submission: Submission) -> Iterator[str]:
 
 
 def _interval_text(
-    label: str, value: float | None, found: ConfidenceInterval | None, *, decimals: int
+    label: str, value: float | None, interval: ConfidenceInterval | None, *, decimals: int
 ) -> str:
     from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- as above
 
-    if value is None or found is None or found.low is None or found.high is None:
+    if value is None or interval is None or interval.low is None or interval.high is None:
         return ""
-    text, low, high = (format_rounded(each, decimals=decimals) for each in (value, found.low, found.high))
+    text, low, high = (
+        format_rounded(each, decimals=decimals) for each in (value, interval.low, interval.high)
+    )
     return f"{label} {text} ({low}–{high})"

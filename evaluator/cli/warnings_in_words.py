@@ -35,15 +35,15 @@ def numbering_in_words(numbering: Numbering) -> str:
 
 
 def numbering_warnings(
-    numbering: Numbering, found: Predictions, *, predictions: Path, annotations: Path
+    numbering: Numbering, parsed: Predictions, *, predictions: Path, annotations: Path
 ) -> list[FileWarning]:
     """A warning for a file of anno_ids that the toolkit has probably numbered otherwise than the manifest."""
     from evaluator.predictions.plausibility import MAX_ROUGHNESS, roughness  # noqa: PLC0415 -- loads numpy
 
-    if found.keys != "anno_id" or not numbering.n_renumbered:
+    if parsed.keys != "anno_id" or not numbering.n_renumbered:
         return []
-    as_manifest = roughness(numbering.manifest, found.ttc_s)
-    as_toolkit = roughness(numbering.manifest, numbering.realigned(found.ttc_s))
+    as_manifest = roughness(numbering.manifest, parsed.ttc_s)
+    as_toolkit = roughness(numbering.manifest, numbering.realigned(parsed.ttc_s))
     origin = "If the toolkit wrote the file"
     if as_manifest is not None and as_toolkit is not None:
         if as_manifest <= MAX_ROUGHNESS < as_toolkit:

@@ -85,7 +85,7 @@ class Account(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ConfidenceInterval(msgspec.Struct, frozen=True, kw_only=True):
-    """Where a value may lie at 95 %, and its row in that column; None where that is not known."""
+    """The 95 % confidence interval of a value and of its rank in that column; None if unknown."""
 
     low: float | None = None
     high: float | None = None
@@ -115,7 +115,7 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     intervals: dict[str, ConfidenceInterval] = {}
 
     def interval(self, score: str) -> ConfidenceInterval:
-        """That of one score; without ends where it was not asked for, or is not known."""
+        """The interval of one score; without ends if it was not asked for or is unknown."""
         return self.intervals.get(score, ConfidenceInterval())
 
 
@@ -166,7 +166,7 @@ class BoardPreview(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Foreseen(msgspec.Struct, frozen=True, kw_only=True):
-    """What everybody would see of a method."""
+    """A preview of what everybody would see of a method."""
 
     name: str
     document: JSON
@@ -195,13 +195,13 @@ class Compared(msgspec.Struct, frozen=True, kw_only=True):
     n_units: int | None = None
 
     def differences(self) -> dict[str, Difference]:
-        """Those of the first pair that there are, by score name."""
-        found = (self.pairs[0].differences or {}) if self.pairs else {}
-        return {name: difference for name, difference in found.items() if difference is not None}
+        """The differences of the first pair that exist, by score name."""
+        by_name = (self.pairs[0].differences or {}) if self.pairs else {}
+        return {name: difference for name, difference in by_name.items() if difference is not None}
 
 
 class Quota(msgspec.Struct, frozen=True, kw_only=True):
-    """What one's own team has left on a split; None is without limit."""
+    """The submissions that the own team has left on a split; None is without limit."""
 
     split: str
     document: JSON
@@ -253,15 +253,15 @@ class BadAnswer(ClientError):
     """
 
     url: str
-    found: str
+    content: str
 
     def __str__(self) -> str:
-        return f"{self.url} gave an unexpected answer: {self.found}"
+        return f"{self.url} gave an unexpected answer: {self.content}"
 
 
 @dataclass(kw_only=True, eq=False)
 class TimedOut(ClientError):
-    """What workers compute was not there in time; `submission` is the last that was seen of a submission."""
+    """The workers did not finish in time; `submission` is the last state that the server gave."""
 
     what: str
     timeout_s: float

@@ -65,7 +65,7 @@ class Client:
     url: str
     token: str | None = field(default=None, repr=False)
     timeout_s: float = 30.0
-    patience: RetryPolicy = field(default_factory=RetryPolicy)
+    retry_policy: RetryPolicy = field(default_factory=RetryPolicy)
     user_agent: str = "tsttc"
     sleep: Callable[[float], None] = time.sleep
     monotonic_s: Callable[[], float] = time.monotonic
@@ -102,10 +102,10 @@ class Client:
         except Refused as refused:
             if refused.status in PASSING_STATUSES or refused.code:
                 raise  # a leaderboard that is away, or refuses in its own words
-            raise BadAnswer(url=self.url, found=f"{refused.status} {refused.title}".strip()) from None
+            raise BadAnswer(url=self.url, content=f"{refused.status} {refused.title}".strip()) from None
         names = [row.get("split") for row in rows(response, JSON)]
         if not all(isinstance(name, str) for name in names):
-            raise BadAnswer(url=self.url, found="a list of other things than splits")
+            raise BadAnswer(url=self.url, content="a list of other things than splits")
         return [str(name) for name in names]
 
     def account(self) -> Account:
@@ -153,10 +153,10 @@ class Client:
         has_intervals: bool = False,
     ) -> Board:
         """The board of a split: the present one, of an `edition`, or as of `at` (a date or an ISO time)."""
-        place = [] if edition is None else ["editions", str(edition)]
+        edition_path = [] if edition is None else ["editions", str(edition)]
         asked = {"sort": sort, "at": at, "intervals": "1" if has_intervals else None}
         params = {name: value for name, value in asked.items() if value}
-        return self._get(Board, "splits", split, *place, "board", params=params)
+        return self._get(Board, "splits", split, *edition_path, "board", params=params)
 
     def export(
         self,
@@ -180,7 +180,7 @@ class Client:
         return self._asked_by_anybody("splits", split, "manifest", accept="text/csv, */*", **query).content
 
     def quota(self) -> list[Quota]:
-        """What one's own team has left, split by split."""
+        """The submissions that the own team has left, by split."""
         return rows(self._asked("quota"), Quota)
 
     def compare(self, split: str, methods: Sequence[str], *, timeout_s: float = 120.0) -> Compared:
@@ -190,12 +190,12 @@ class Client:
         address, n_asked = self._address("compare"), 0
         while True:
             response = self._retry(lambda: self._http.get(address, params=params))
-            found = one(response, Compared)
-            if found.is_complete:
-                return found
+            comparison = one(response, Compared)
+            if comparison.is_complete:
+                return comparison
             n_asked += 1
             asked_s = retry_after_s(response.headers)
-            delay_s = self.patience.delay_s(n_failed=n_asked, retry_after_s=asked_s, rng=self.rng)
+            delay_s = self.retry_policy.delay_s(n_failed=n_asked, retry_after_s=asked_s, rng=self.rng)
             if self.monotonic_s() + delay_s >= until_s:
                 raise TimedOut(what="the comparison is not ready", timeout_s=timeout_s)
             self.sleep(delay_s)
@@ -226,7 +226,7 @@ class Client:
         return self._get(Method, "methods", method_id)
 
     def foreseen(self, method_id: str, visibility: str) -> Foreseen:
-        """What everybody would see of a method of one's own, were it "PUBLIC" or "ANONYMOUS"."""
+        """Preview what everybody would see of an own method if it were "PUBLIC" or "ANONYMOUS"."""
         return self._get(Foreseen, "methods", method_id, "visibility", params={"as": visibility})
 
     def show_method(self, method_id: str, visibility: str, *, reveal_at: str | None = None) -> Method:
@@ -287,7 +287,7 @@ class Client:
     def _next_look_s(self, again_s: float | None, *, n_same: int, n_looks: int) -> float:
         if again_s == 1 and n_looks <= N_EARLY_LOOKS:  # Retry-After has no way to say less
             return EARLY_LOOK_S
-        return again_s or self.patience.delay_s(n_failed=n_same, retry_after_s=None, rng=self.rng)
+        return again_s or self.retry_policy.delay_s(n_failed=n_same, retry_after_s=None, rng=self.rng)
 
     def _listed(self, kind: type[T], *path: str) -> Iterator[T]:
         """The rows of a list, page after page."""
@@ -306,7 +306,7 @@ class Client:
         return self._retry(lambda: self._http.get(self._address(*path), params=params))
 
     def _asked_by_anybody(self, *path: str, accept: str, **query: int) -> httpx.Response:
-        """What everybody may read is read without the token, which may not be good for reading."""
+        """Read public pages without the token, which may lack the right to read."""
         headers = {"Accept": accept}
         request = self._http.build_request("GET", self._address(*path), params=query, headers=headers)
         request.headers.pop("Authorization", None)
@@ -329,16 +329,18 @@ class Client:
         return response
 
     def _retry(self, send: Callable[[], httpx.Response]) -> httpx.Response:
-        """Send until answered, as often as the patience goes, as long as trying again makes sense."""
+        """Send until answered, as often as the retry policy allows, as long as trying again makes sense."""
         n_failed = 0
         while True:
             try:
                 return self._checked(send)
             except (Unreachable, Refused) as fault:
                 n_failed += 1
-                n_tries = self.patience.n_tries if self._was_answered else self.patience.n_first_tries
-                is_lasting = isinstance(fault, Refused) and not self.patience.may_pass(fault)
+                n_tries = self.retry_policy.n_tries if self._was_answered else self.retry_policy.n_first_tries
+                is_lasting = isinstance(fault, Refused) and not self.retry_policy.may_pass(fault)
                 if n_failed >= n_tries or is_lasting:
                     raise
                 delay_after_s = fault.retry_after_s if isinstance(fault, Refused) else None
-            self.sleep(self.patience.delay_s(n_failed=n_failed, retry_after_s=delay_after_s, rng=self.rng))
+            self.sleep(
+                self.retry_policy.delay_s(n_failed=n_failed, retry_after_s=delay_after_s, rng=self.rng)
+            )

@@ -58,7 +58,9 @@ def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
     if response.is_success:
         return response
     if response.is_redirect:
-        raise BadAnswer(url=url, found=f"a redirect to {response.headers['location']}, which is not followed")
+        raise BadAnswer(
+            url=url, content=f"a redirect to {response.headers['location']}, which is not followed"
+        )
     raise _refused(response)
 
 
@@ -75,7 +77,7 @@ def _reason(error: httpx.TransportError | httpx.DecodingError) -> str:
 
 
 def _refused(response: httpx.Response) -> Refused:
-    """An error answer read leniently: whatever stands between client and server may have written it."""
+    """Read an error answer leniently: a proxy may have written it."""
     try:
         document = msgspec.json.decode(response.content)
     except msgspec.DecodeError:
@@ -107,24 +109,24 @@ def decoded(response: httpx.Response) -> object:
     try:
         return msgspec.json.decode(response.content)
     except msgspec.DecodeError:
-        found = response.headers.get("content-type", "no content type")
-        raise BadAnswer(url=str(response.url), found=f"not JSON ({found})") from None
+        content_type = response.headers.get("content-type", "no content type")
+        raise BadAnswer(url=str(response.url), content=f"not JSON ({content_type})") from None
 
 
 def one(response: httpx.Response, kind: type[T], **more: object) -> T:
     """The JSON answer as `kind`, with the whole of it as its `document`. Raises BadAnswer."""
     url, document = str(response.url), decoded(response)
     if not isinstance(document, dict):
-        raise BadAnswer(url=url, found="JSON, but no object")
+        raise BadAnswer(url=url, content="JSON, but no object")
     return _converted(document, kind, url=url, **more)
 
 
 def rows(response: httpx.Response, kind: type[T]) -> list[T]:
     """The JSON answer as a list of `kind`. Raises BadAnswer."""
-    url, found = str(response.url), decoded(response)
-    if not isinstance(found, list):
-        raise BadAnswer(url=url, found="JSON, but no list")
-    return [_converted(row, kind, url=url) for row in found]
+    url, document = str(response.url), decoded(response)
+    if not isinstance(document, list):
+        raise BadAnswer(url=url, content="JSON, but no list")
+    return [_converted(row, kind, url=url) for row in document]
 
 
 def next_page(response: httpx.Response) -> Mapping[str, str]:
@@ -133,7 +135,7 @@ def next_page(response: httpx.Response) -> Mapping[str, str]:
     try:
         return dict(httpx.URL(link).params)
     except httpx.InvalidURL:
-        raise BadAnswer(url=str(response.url), found=f"a next page that is none ({link[:60]})") from None
+        raise BadAnswer(url=str(response.url), content=f"a next page that is none ({link[:60]})") from None
 
 
 def _converted(document: object, kind: type[T], *, url: str, **more: object) -> T:
@@ -144,4 +146,4 @@ def _converted(document: object, kind: type[T], *, url: str, **more: object) -> 
     try:
         return msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
-        raise BadAnswer(url=url, found=str(error)) from None
+        raise BadAnswer(url=url, content=str(error)) from None

@@ -81,7 +81,7 @@ def split_name(name: str) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Protocol:
-    """How a predicted time to contact is prepared before its errors are taken, and what is made of these.
+    """The rules by which predicted times to contact become scores.
 
     Predictions outside [−limit_s, limit_s] are truncated to its ends. With `near_zero_s = (low, high)`,
     predictions in (low, 0) become `low` and those in (0, high) become `high`; with None they stay, and those
@@ -210,7 +210,7 @@ def grouped_names(names: Iterable[str]) -> dict[Metric, list[str]]:
     >>> {metric.symbol: names for metric, names in grouped_names(["mid", "mid_small", "rte"]).items()}
     {'MiD': ['mid', 'mid_small'], 'RTE': ['rte']}
     """
-    found: dict[Metric, list[str]] = {}
+    groups: dict[Metric, list[str]] = {}
     for name in names:
-        found.setdefault(metric_of(name), []).append(name)
-    return found
+        groups.setdefault(metric_of(name), []).append(name)
+    return groups

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """What errors are made of: float64 arrays of one shape, one item for each sequence.
+    """The input of a metric: float64 arrays of one shape, one item for each sequence.
 
     `true_log_scale_ratio` is ln α₁₀(τ) by `scale.exact_log`; a `GroundTruth` keeps it. Predictions are taken
     as they are: truncation is the protocol's business.
@@ -76,7 +76,7 @@ class Metric:
 
     @property
     def unit_of_value(self) -> str:
-        """What stands behind a value in a sentence, with its space; nothing for a power of ten.
+        """The unit that follows a value in a sentence, with its space; empty for a power of ten.
 
         >>> MID.unit_of_value, RTE.unit_of_value
         ('', ' %')

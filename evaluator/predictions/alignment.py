@@ -16,7 +16,7 @@ from evaluator.problems import Findings, listed, pointer, quoted
 from evaluator.truth.ground_truth import Manifest
 
 KeyKind = Literal["anno_id", "natural_key"]
-Place = Callable[[str], str]
+PointerOf = Callable[[str], str]
 """The JSON pointer to the member of a name."""
 Fault = Callable[[object], tuple[str, str] | None]
 """Code and message for a value that cannot be taken."""
@@ -60,15 +60,15 @@ def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
 def read_rates(document: Document, manifest: Manifest, findings: Findings) -> Floats:
     """The pair rates in Hz, (n,) or (); faults are noted."""
 
-    def by_key(members: Members, place: Place, fault: Fault) -> Floats:
-        _check_keys(members, manifest, findings, place)
-        return _column(members, manifest, findings, place, fault)
+    def by_key(members: Members, pointer_of: PointerOf, fault: Fault) -> Floats:
+        _check_keys(members, manifest, findings, pointer_of)
+        return _column(members, manifest, findings, pointer_of, fault)
 
     return rates_of(document, findings, by_key)
 
 
 def rates_of(
-    document: Document, findings: Findings, by_key: Callable[[Members, Place, Fault], Floats]
+    document: Document, findings: Findings, by_key: Callable[[Members, PointerOf, Fault], Floats]
 ) -> Floats:
     """The pair rates in Hz, () or what `by_key` makes of an object of rates; faults are noted."""
     is_gap = document.rate_name == "frame_gap"
@@ -84,7 +84,7 @@ def rates_of(
     return fps_of_gap(rates) if is_gap else rates
 
 
-def _check_keys(members: Members, manifest: Manifest, findings: Findings, place: Place) -> KeyKind:
+def _check_keys(members: Members, manifest: Manifest, findings: Findings, pointer_of: PointerOf) -> KeyKind:
     """Note missing, unknown, duplicate and mixed keys; return the kind of most known keys."""
     by_id, by_natural_key = manifest.row_of_id, manifest.row_of_natural_key
     names = [name for name, _ in members]
@@ -99,15 +99,15 @@ def _check_keys(members: Members, manifest: Manifest, findings: Findings, place:
             f"{listed([quoted(name) for name in unknown])}; expected its anno_ids, as plain decimal numbers, "
             "or its natural keys bag_stamp/cam_id/ts/track_id."
         )
-        findings.group("unknown-keys", message, place(unknown[0]), n_faults=len(unknown))
-    require_once(names, findings, place)
+        findings.group("unknown-keys", message, pointer_of(unknown[0]), n_faults=len(unknown))
+    require_once(names, findings, pointer_of)
     if id_names and natural_names:
         rare = id_names if kind == "natural_key" else natural_names
         message = (
             f"The file mixes {len(id_names):,} anno_ids with {len(natural_names):,} natural keys; "
             f"the odd ones: {listed([quoted(name) for name in rare])}; expected one kind of key."
         )
-        findings.group("mixed-keys", message, place(rare[0]), n_faults=len(rare))
+        findings.group("mixed-keys", message, pointer_of(rare[0]), n_faults=len(rare))
     given = {by_id[name] for name in id_names} | {by_natural_key[name] for name in natural_names}
     n_missing = manifest.n_sequences - len(given)
     if n_missing:
@@ -117,24 +117,32 @@ def _check_keys(members: Members, manifest: Manifest, findings: Findings, place:
             f"{_n(n_missing, 'sequence has', 'sequences have')} no value: {listed(missing)}; "
             f"expected one for each of the manifest's {manifest.n_sequences:,} sequences, by {noun}."
         )
-        findings.group("missing-keys", message, place(missing[0]), n_faults=n_missing)
+        findings.group("missing-keys", message, pointer_of(missing[0]), n_faults=n_missing)
     return kind
 
 
-def _column(members: Members, manifest: Manifest, findings: Findings, place: Place, fault: Fault) -> Floats:
+def _column(
+    members: Members, manifest: Manifest, findings: Findings, pointer_of: PointerOf, fault: Fault
+) -> Floats:
     by_id, by_natural_key = manifest.row_of_id, manifest.row_of_natural_key
     rows = [by_id.get(name, by_natural_key.get(name)) for name, _ in members]
-    return column(members, rows, findings, place, fault, n=manifest.n_sequences)
+    return column(members, rows, findings, pointer_of, fault, n=manifest.n_sequences)
 
 
 def column(
-    members: Members, rows: Iterable[int | None], findings: Findings, place: Place, fault: Fault, *, n: int
+    members: Members,
+    rows: Iterable[int | None],
+    findings: Findings,
+    pointer_of: PointerOf,
+    fault: Fault,
+    *,
+    n: int,
 ) -> Floats:
     """The values (n,) by the row of each member, NaN where none is given or usable; faults are noted."""
     values = np.full(n, math.nan)
     for (name, value), row in zip(members, rows, strict=True):
         if problem := fault(value):
-            findings.add(problem[0], problem[1], place(name))
+            findings.add(problem[0], problem[1], pointer_of(name))
         elif row is not None:
             values[row] = value
     return values
@@ -185,7 +193,7 @@ def _is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def require_once(names: list[str], findings: Findings, place: Place) -> None:
+def require_once(names: list[str], findings: Findings, pointer_of: PointerOf) -> None:
     """Note keys that appear more than once."""
     repeated = [name for name, count in Counter(names).items() if count > 1]
     if repeated:
@@ -193,7 +201,7 @@ def require_once(names: list[str], findings: Findings, place: Place) -> None:
             f"{_n(len(repeated), 'key appears', 'keys appear')} more than once: "
             f"{listed([quoted(name) for name in repeated])}; expected every key once."
         )
-        findings.group("duplicate-keys", message, place(repeated[0]), n_faults=len(repeated))
+        findings.group("duplicate-keys", message, pointer_of(repeated[0]), n_faults=len(repeated))
 
 
 def _n(count: int, one: str, many: str) -> str:

@@ -92,10 +92,10 @@ def _split(text: bytes) -> tuple[bytes, Document] | None:
 
 
 def _split_envelope(text: bytes) -> tuple[bytes, Document] | None:
-    found = _PREDICTIONS.search(text, 0, _MAX_AROUND)
-    if found is None:
+    match = _PREDICTIONS.search(text, 0, _MAX_AROUND)
+    if match is None:
         return None
-    start = found.end() - 1
+    start = match.end() - 1
     stop = text.find(b"}", start) + 1
     around = text[:start], text[stop:]
     if sum(map(len, around)) > _MAX_AROUND or any(_PLACEHOLDER.encode() in part for part in around):

@@ -19,7 +19,7 @@ from evaluator.metrics.scale import (
 from evaluator.predictions.alignment import (
     ZERO_MESSAGE,
     Fault,
-    Place,
+    PointerOf,
     column,
     rates_of,
     ratio_fault,
@@ -125,7 +125,7 @@ def _gap(frame_gap: int | None) -> int:
 
 
 def _require_anno_ids(
-    names: list[str], natural_keys: Mapping[str, str], findings: Findings, place: Place
+    names: list[str], natural_keys: Mapping[str, str], findings: Findings, pointer_of: PointerOf
 ) -> None:
     """Note every way in which the keys of the file are not the anno_ids of the folder."""
     if names and set(natural_keys.values()).issuperset(names):
@@ -133,7 +133,7 @@ def _require_anno_ids(
             f"The {len(names):,} keys are natural keys already; expected anno_ids of the toolkit. "
             "The file needs no annotations: it can be sent as it is."
         )
-        findings.group("unknown-keys", message, place(names[0]), n_faults=len(names))
+        findings.group("unknown-keys", message, pointer_of(names[0]), n_faults=len(names))
         return
     given = set(names)
     n_in_folder = counted(len(natural_keys), "sequence")
@@ -144,19 +144,19 @@ def _require_anno_ids(
         expected = f"expected the anno_ids 0 to {len(natural_keys) - 1}"
         shown = listed([quoted(name) for name in sorted(unknown)])
         message = f"{counts}; no sequence for {len(unknown):,} of the anno_ids: {shown}; {expected}."
-        findings.group("unknown-keys", message, place(min(unknown)), n_faults=len(unknown))
+        findings.group("unknown-keys", message, pointer_of(min(unknown)), n_faults=len(unknown))
     if missing:
         message = (
             f"{counts}; no value for {len(missing):,} of the sequences: {listed(missing)}; "
             "expected one for each, from the folder that the toolkit has read."
         )
-        findings.group("missing-keys", message, place(missing[0]), n_faults=len(missing))
+        findings.group("missing-keys", message, pointer_of(missing[0]), n_faults=len(missing))
 
 
 def _rates(document: Document, names: list[str], findings: Findings) -> Floats:
     """The pair rates in Hz, (n,) or (); faults are noted."""
 
-    def by_key(members: Members, place: Place, fault: Fault) -> Floats:
+    def by_key(members: Members, pointer_of: PointerOf, fault: Fault) -> Floats:
         given = dict(members)
         missing = [key for key in names if key not in given]
         if missing:
@@ -164,9 +164,9 @@ def _rates(document: Document, names: list[str], findings: Findings) -> Floats:
                 f"{len(missing):,} keys have no {document.rate_name}: {listed(missing)}; "
                 "expected one for each prediction."
             )
-            findings.group("missing-keys", message, place(missing[0]), n_faults=len(missing))
+            findings.group("missing-keys", message, pointer_of(missing[0]), n_faults=len(missing))
         row_of = {name: row for row, name in enumerate(names)}
         rows = [row_of.get(key) for key, _ in members]
-        return column(members, rows, findings, place, fault, n=len(names))
+        return column(members, rows, findings, pointer_of, fault, n=len(names))
 
     return rates_of(document, findings, by_key)

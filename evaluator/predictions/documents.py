@@ -59,7 +59,7 @@ class Document:
     enveloped: bool
 
     def pointer(self, key: str) -> str:
-        """Where the prediction of `key` stands."""
+        """The JSON pointer to the prediction of `key`."""
         return pointer("predictions", key) if self.enveloped else pointer(key)
 
 
@@ -100,14 +100,14 @@ def parse(data: bytes, *, max_members: int | None = None) -> object:
         return json.loads(text, object_pairs_hook=Members, parse_int=_integer)
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
-        found = quoted(text[error.pos : error.pos + 20]) if error.pos < len(text) else "the end of the file"
+        excerpt = quoted(text[error.pos : error.pos + 20]) if error.pos < len(text) else "the end of the file"
         fault = error.msg[0].lower() + error.msg[1:].removesuffix(" at").removesuffix(" starting")
-        message = f"The text is not JSON: {fault}, found {found}.{_hint(data)}"
+        message = f"The text is not JSON: {fault}, found {excerpt}.{_hint(data)}"
         raise reject("not-json", message, where) from None
 
 
 def _hint(data: bytes) -> str:
-    """What a file is that begins so, in a sentence; empty where its first bytes say nothing."""
+    """A sentence on the kind of a file that begins with these bytes; empty if they are of no known kind."""
     kind = next((kind for start, kind in _LOOKS_LIKE.items() if data.startswith(start)), "")
     return f" The file looks like {kind}." if kind else ""
 
@@ -151,7 +151,7 @@ def read_document(value: object) -> Document:
 
 
 def kind_of(value: object) -> str:
-    """What a JSON value is, for messages, with the value where it is short.
+    """The kind of a JSON value for messages, with the value if it is short.
 
     >>> kind_of("5.3"), kind_of(None), kind_of([1])
     ('the string "5.3"', 'null', 'a list')
@@ -176,8 +176,8 @@ def _unit(fields: Mapping[str, object], findings: Findings) -> Unit:
     unit = fields.get("unit")
     if unit == "ttc" or unit == "scale_ratio":  # noqa: PLR1714 -- narrows the type
         return unit
-    found = kind_of(unit) if "unit" in fields else "none"
-    findings.add("unknown-unit", f'The unit is {found}; expected "ttc" or "scale_ratio".', "/unit")
+    given = kind_of(unit) if "unit" in fields else "none"
+    findings.add("unknown-unit", f'The unit is {given}; expected "ttc" or "scale_ratio".', "/unit")
     return "ttc"
 
 
@@ -272,16 +272,16 @@ def _depth(body: bytes) -> int:
 
 
 def _brackets(body: bytes) -> bytearray:
-    """The brackets of a text that stand outside of its strings."""
+    """The brackets of a text outside its strings."""
     # Match by match: to remove millions of strings at once would take eighty bytes for each piece left.
-    found, end = bytearray(), 0
+    brackets, end = bytearray(), 0
     for string in _STRING.finditer(body):
         start = string.start()
         if start > end:
-            found += body[end:start].translate(None, delete=_NO_BRACKETS)
+            brackets += body[end:start].translate(None, delete=_NO_BRACKETS)
         end = string.end()
-    found += body[end:].translate(None, delete=_NO_BRACKETS)
-    return found
+    brackets += body[end:].translate(None, delete=_NO_BRACKETS)
+    return brackets
 
 
 _CHUNK: Final = 1 << 16

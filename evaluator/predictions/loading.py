@@ -84,8 +84,8 @@ class Predictions:
             require_values(values, manifest.anno_id_keys, is_ratio=True)
             values, unit = scale_ratio_to_ttc(values, fps_hz=rate_hz), "scale_ratio"
         values.setflags(write=False)
-        found = digest if digest is not None else sha256_digest(values.astype("<f8").tobytes())
-        return cls(manifest=manifest, ttc_s=values, digest=found, unit=unit)
+        content_digest = digest if digest is not None else sha256_digest(values.astype("<f8").tobytes())
+        return cls(manifest=manifest, ttc_s=values, digest=content_digest, unit=unit)
 
     def where(self, row: int) -> str:
         """The JSON pointer to the value of sequence `row`."""
@@ -111,16 +111,16 @@ def read_predictions(source: Source, *, manifest: Manifest, max_bytes: int | Non
 def read_sent(data: bytes, *, manifest: Manifest) -> Predictions:
     """As `read_predictions`, in the forms that a leaderboard takes: bytes of strangers come here."""
     text = json_of(data, max_rows=2 * manifest.n_sequences + 100_000)
-    found = read_column(text, manifest) or read_slowly(text, manifest)
-    found.ttc_s.setflags(write=False)
+    column = read_column(text, manifest) or read_slowly(text, manifest)
+    column.ttc_s.setflags(write=False)
     return Predictions(
         manifest=manifest,
-        ttc_s=found.ttc_s,
+        ttc_s=column.ttc_s,
         digest=sha256_digest(data),
-        unit=found.document.unit,
-        meta=found.document.meta,
-        keys=found.keys,
-        enveloped=found.document.enveloped,
+        unit=column.document.unit,
+        meta=column.document.meta,
+        keys=column.keys,
+        enveloped=column.document.enveloped,
     )
 
 
@@ -212,8 +212,8 @@ def _member(data: bytes, start: int, *, max_bytes: int) -> tuple[bytes, int]:
 
 def _is_table(data: bytes) -> bool:
     """Whether the first line names columns of a table; no JSON text begins so."""
-    found = _FIRST_LINE.match(data.removeprefix(b"\xef\xbb\xbf"))
-    line = found[1] if found else b""
+    match = _FIRST_LINE.match(data.removeprefix(b"\xef\xbb\xbf"))
+    line = match[1] if match else b""
     fields = line.decode("utf-8", "replace").split(",")
     return (
         len(fields) > 1
@@ -259,7 +259,7 @@ def _checked(rows: Iterator[list[str]], *, n_fields: int) -> Iterator[list[str]]
 
 
 def columns_of(header: Sequence[str]) -> tuple[Sequence[str], str, str | None]:
-    """Of the columns of a table, those of the key, that of the value and, of scale ratios, that of the rate.
+    """The key columns, the value column and, for scale ratios, the rate column of a table.
 
     Raises `Rejected` for a table without the columns that it needs.
     """
@@ -280,10 +280,10 @@ def document_of(header: Sequence[str], rows: Iterable[Sequence[str | None]]) -> 
     """
     keys, value, rate = columns_of(header)
     columns = {name: header.index(name) for name in (*keys, value, *([rate] if rate else []))}
-    places = [columns[name] for name in keys]
+    key_positions = [columns[name] for name in keys]
     members, ratios = list[str](), list[str]()
     for row in rows:
-        name = json.dumps("/".join((row[place] or "").strip() for place in places))
+        name = json.dumps("/".join((row[position] or "").strip() for position in key_positions))
         members.append(f"{name}:{_number(row[columns[value]])}")
         if rate is not None:
             ratios.append(f"{name}:{_number(row[columns[rate]])}")

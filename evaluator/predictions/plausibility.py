@@ -44,13 +44,13 @@ Pairs = NDArray[np.intp]
 
 
 def warnings_of(predictions: Predictions) -> list[FileWarning]:
-    """What the file and its manifest tell, without any true value."""
+    """Warnings from the file and its manifest, without any true value."""
     manifest, ttc_s = predictions.manifest, predictions.ttc_s
     return [*unit_warnings(ttc_s), *_sign_warnings(manifest, ttc_s), *_order_warnings(manifest, ttc_s)]
 
 
 def unit_warnings(ttc_s: Floats) -> list[FileWarning]:
-    """What the values tell by themselves, (n,): whether they look like another unit than seconds."""
+    """Warnings from the values alone, (n,): whether they look like another unit than seconds."""
     n = len(ttc_s)
     if n < MIN_VALUES:
         return []
@@ -87,12 +87,12 @@ def _sign_warnings(manifest: Manifest, ttc_s: Floats) -> list[FileWarning]:
 
 
 def _order_warnings(manifest: Manifest, ttc_s: Floats) -> list[FileWarning]:
-    found = roughness(manifest, ttc_s)
-    if found is None or found <= MAX_ROUGHNESS:
+    jump_ratio = roughness(manifest, ttc_s)
+    if jump_ratio is None or jump_ratio <= MAX_ROUGHNESS:
         return []
     message = (
         "The values look shuffled: from one window to the next those of one object differ "
-        f"{found:.2f} times as much as those of two objects; expected at most {MAX_ROUGHNESS}, since "
+        f"{jump_ratio:.2f} times as much as those of two objects; expected at most {MAX_ROUGHNESS}, since "
         f"an object changes slowly. {_CAUSE}"
     )
     return [FileWarning("shuffled-values", message)]
@@ -104,10 +104,10 @@ def warnings_with_truth(predictions: Predictions, truth: GroundTruth) -> list[Fi
 
 
 def _truth_warnings(predictions: Predictions, truth: GroundTruth) -> list[FileWarning]:
-    found, true = order_of(predictions.ttc_s), order_of(truth.ttc_s)
-    if truth.n_sequences < MIN_PAIRS or found.std() == 0 or true.std() == 0:
+    predicted, true = order_of(predictions.ttc_s), order_of(truth.ttc_s)
+    if truth.n_sequences < MIN_PAIRS or predicted.std() == 0 or true.std() == 0:
         return []
-    correlation = float(np.corrcoef(found, true)[0, 1])
+    correlation = float(np.corrcoef(predicted, true)[0, 1])
     flipped = float(np.mean((predictions.ttc_s < 0) != (truth.ttc_s < 0)))
     has_both_signs = bool((predictions.ttc_s < 0).any() and (predictions.ttc_s > 0).any())
     if correlation >= MIN_CORRELATION and not (has_both_signs and flipped > MAX_FLIPPED):
@@ -155,8 +155,8 @@ def order_of(ttc_s: Floats) -> Floats:
 
 
 def _mean_difference(ranks: Floats, pairs: Pairs) -> float:
-    found = float(np.abs(ranks[pairs[:, 0]] - ranks[pairs[:, 1]]).mean())
-    return found if math.isfinite(found) else 0.0
+    mean = float(np.abs(ranks[pairs[:, 0]] - ranks[pairs[:, 1]]).mean())
+    return mean if math.isfinite(mean) else 0.0
 
 
 @lru_cache(maxsize=4)  # by the manifest itself, which every file of a split shares

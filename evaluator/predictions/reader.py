@@ -68,10 +68,10 @@ def main() -> None:
     out.write(READY)
     out.flush()
     try:
-        found = answer(sys.stdin.buffer.read(), manifest=manifest)
+        reply = answer(sys.stdin.buffer.read(), manifest=manifest)
     except MemoryError:
         sys.exit(EXIT_OUT_OF_MEMORY)
-    out.write(found)
+    out.write(reply)
     out.flush()
 
 

@@ -151,7 +151,7 @@ def markdown_address(url: str) -> str:
 
 
 def guarded(text: str) -> str:
-    """A text that no spreadsheet takes for a formula: an apostrophe stands before what might be one.
+    """A text that no spreadsheet takes for a formula: an apostrophe precedes what might be one.
 
     >>> guarded("=1+1"), guarded("Deep Scale"), guarded("A;=1+1;B")
     ("'=1+1", 'Deep Scale', "A;'=1+1;B")

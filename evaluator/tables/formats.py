@@ -83,8 +83,8 @@ def parquet_of(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) 
         raise ModuleNotFoundError(
             "Parquet tables need pyarrow, which is not installed: pip install pyarrow", name="pyarrow"
         ) from error
-    held = list(rows)
-    table = pa.table({name: pa.array([row.get(name) for row in held]) for name in columns})
+    row_list = list(rows)
+    table = pa.table({name: pa.array([row.get(name) for row in row_list]) for name in columns})
     out = io.BytesIO()
     parquet.write_table(table, out)
     return out.getvalue()

@@ -39,7 +39,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
-    """What a table was taken from. `address` is one at which the same board stays; None is not known."""
+    """The source of a table. `address` keeps showing the same board; None is unknown."""
 
     split: str
     address: str
@@ -96,7 +96,7 @@ def about(origin: Origin) -> tuple[str, ...]:
 
 
 def mark_of(*, visibility: str, pseudonym: str | None) -> str:
-    """What is said of a row of one's own that others do not see as it is; nothing of any other row."""
+    """The mark of an own row that others do not see as it is; empty for any other row."""
     return "private" if visibility == "PRIVATE" else "anonymous" if pseudonym else ""
 
 
@@ -160,13 +160,13 @@ def as_latex(export: Export) -> str:
 
 
 def _caption(rows: Sequence[Row], origin: Origin) -> tuple[str, ...]:
-    """What the brackets are, in a table that has some."""
+    """A sentence on the brackets of a table that has some."""
     has_some = any(cell.low and cell.high for row in rows for cell in row.cells)
     return (brackets(origin.unit, origin.n_units),) if has_some else ()
 
 
 def brackets(unit: str, n_units: int | None) -> str:
-    """What the brackets of a table with intervals are."""
+    """A sentence on the brackets of a table with intervals."""
     return (
         f"In square brackets: 95 % confidence interval, bootstrap over {in_words(unit, n_units)}. In round "
         "brackets behind a rank: rank range at 95 %."

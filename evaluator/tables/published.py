@@ -77,7 +77,7 @@ class PrintedTable:
 
     @property
     def n_results(self) -> int:
-        """How many measured numbers it has."""
+        """The number of measured values."""
         return sum(len(row.values) for row in self.table.rows) if self.table.is_result else 0
 
     @property
@@ -87,7 +87,7 @@ class PrintedTable:
 
     @property
     def units(self) -> str:
-        """What its headings mean; empty for a table without results."""
+        """The units of its headings; empty for a table without results."""
         if not self.table.is_result:
             return ""
         metrics = dict.fromkeys(metric_of(name) for name in self.table.columns if name in SCORE_NAMES)
@@ -116,14 +116,14 @@ def _names(table: PublishedTable) -> list[tuple[str, Callable[[PublishedRow], st
     """Heading and text of the columns before the values: what the rows differ in."""
     if not table.is_result:
         return [(_FIRST_HEADINGS.get(table.name, ""), lambda row: _LABELS.get(str(row.key), str(row.key)))]
-    found: list[tuple[str, Callable[[PublishedRow], str]]] = []
+    name_columns: list[tuple[str, Callable[[PublishedRow], str]]] = []
     if len({row.split for row in table.rows}) > 1:
-        found.append(("Split", lambda row: row.split or ""))
+        name_columns.append(("Split", lambda row: row.split or ""))
     if table.parameter is None or len({row.method for row in table.rows}) > 1:
-        found.append(("Method", method_name))
+        name_columns.append(("Method", method_name))
     if table.parameter is not None:
-        found.append((_SETTINGS.get(table.parameter, table.parameter), setting_text))
-    return found
+        name_columns.append((_SETTINGS.get(table.parameter, table.parameter), setting_text))
+    return name_columns
 
 
 def method_name(row: PublishedRow) -> str:
@@ -269,7 +269,7 @@ def document(shown: PrintedTable) -> dict[str, Any]:
 
 
 def about(shown: PrintedTable, tables: PublishedTables | None = None) -> tuple[str, ...]:
-    """Where a table comes from, in a line or two."""
+    """The source of a table, in one or two lines."""
     source = (tables or published_tables()).source
     default = " The paper's default is bold." if any(row.is_default for row in shown.rows) else ""
     return (

@@ -89,12 +89,12 @@ def as_latex(rows: Sequence[ResultRow], *, by: str | None) -> str:
 
 
 def _caption(rows: Sequence[ResultRow]) -> str:
-    """What the numbers are, and the brackets where there are some."""
+    """The metrics of a table and, if it has brackets, their meaning."""
     metrics = ", ".join(metric.heading for metric in grouped_names(rows[0].scores))
-    said = f"{metrics}; lower is better."
+    caption = f"{metrics}; lower is better."
     if not any(row.units and any(row.intervals.values()) for row in rows):
-        return said
-    return f"{said} In square brackets: 95 % confidence interval, bootstrap over {rows[0].units}."
+        return caption
+    return f"{caption} In square brackets: 95 % confidence interval, bootstrap over {rows[0].units}."
 
 
 def cells_of(row: ResultRow) -> Iterator[str]:

@@ -15,7 +15,7 @@ _DECIMALS_IN_WORDS: Final = {1: "one decimal", 2: "two decimals"}
 
 
 def p_text(p: float | None, below: float | None = None) -> str:
-    """A p-value in words, with four decimals; where p itself is not told, the class that it is below.
+    """A p-value in words, with four decimals; the class that it is below if p itself is withheld.
 
     >>> p_text(0.0496), p_text(0.3), p_text(1.0)
     ('p = 0.0496', 'p = 0.3000', 'p = 1')
@@ -41,41 +41,41 @@ def p_cell(p: float | None, below: float | None) -> str:
 
 
 def sentence(
-    first: str, second: str, *, name: str, found: Difference, decimals: int = 2, withheld: str = ""
+    first: str, second: str, *, name: str, difference: Difference, decimals: int = 2, withheld: str = ""
 ) -> str:
-    """What a difference in one column means, in words; `decimals` are those in which values are published.
+    """A difference in one column as a sentence; `decimals` are those of published values.
 
     `withheld` says why there is no interval, in a sentence, where it is not for too few units.
 
-    >>> sentence("A", "B", name="mid_crucial", found=Difference(-4.1, -5.3, -2.9, 0.0003))
+    >>> sentence("A", "B", name="mid_crucial", difference=Difference(-4.1, -5.3, -2.9, 0.0003))
     "A's MiD on crucial is 4.1 lower than B's (95 % confidence interval: 2.9 to 5.3 lower; p = 0.0003)."
-    >>> sentence("A", "B", name="rte", found=Difference(0.7, 0.2, 1.2, 0.02))  # doctest: +ELLIPSIS
+    >>> sentence("A", "B", name="rte", difference=Difference(0.7, 0.2, 1.2, 0.02))  # doctest: +ELLIPSIS
     "A's RTE is 0.70 percentage points higher than B's (95 % confidence interval: 0.20 to 1.20 higher; ...
     """
     column, unit = column_words(name), metric_of(name).unit_of_difference
-    if round(found.difference, decimals) == 0:
+    if round(difference.difference, decimals) == 0:
         alike = f"{first} and {second} have the same {column} to {_DECIMALS_IN_WORDS[decimals]}."
         return f"{alike} {withheld}".rstrip()
-    digits = _digits(found, decimals)
+    digits = _digits(difference, decimals)
     gap = (
-        f"{_of(first)} {column} is {_amount(found.difference, digits)}{unit} "
-        f"{_direction(found.difference)} than {_of(second)}"
+        f"{_of(first)} {column} is {_amount(difference.difference, digits)}{unit} "
+        f"{_direction(difference.difference)} than {_of(second)}"
     )
     if withheld:
         return f"{gap}. {withheld}"
-    if found.low is None or found.high is None or found.p_below is None:
-        few = too_few_units(found.n_effective, unit=found.unit)
+    if difference.low is None or difference.high is None or difference.p_below is None:
+        few = too_few_units(difference.n_effective, unit=difference.unit)
         return f"{gap}; there are {few} to say whether that is significant."
-    ends = _ends(found.difference, found.low, found.high, digits)
-    if found.is_significant and 0 in (found.low, found.high):
+    ends = _ends(difference.difference, difference.low, difference.high, digits)
+    if difference.is_significant and 0 in (difference.low, difference.high):
         # So it is on a hidden split alone, where p judges and the ends only say how large.
         ends += ", rounded outwards"
-    told = f"{gap} (95 % confidence interval: {ends}; {p_text(found.p, found.p_below)})."
-    detectable = found.detectable_difference
+    statement = f"{gap} (95 % confidence interval: {ends}; {p_text(difference.p, difference.p_below)})."
+    detectable = difference.detectable_difference
     if detectable is None:
-        return told
+        return statement
     return (
-        f"{told} The difference is not significant. The test detects a difference above "
+        f"{statement} The difference is not significant. The test detects a difference above "
         f"{_amount(detectable, digits)}{unit} with about 80 % power."
     )
 
@@ -103,43 +103,43 @@ def _amount(value: float, digits: int) -> str:
     return f"{max(abs(value), unit) if value else 0.0:.{digits}f}"
 
 
-def _digits(found: Difference, decimals: int) -> int:
-    """As many as give the half width two digits, enough to tell the difference, never more than published."""
-    if found.low is None or found.high is None:
+def _digits(difference: Difference, decimals: int) -> int:
+    """The decimals that give the half width two digits and show the difference; at most `decimals`."""
+    if difference.low is None or difference.high is None:
         return decimals
-    half = (found.high - found.low) / 2
+    half = (difference.high - difference.low) / 2
     fewest = 0 if half >= 10 else 1 if half >= 0.995 else 2
-    smallest = min(abs(value) for value in (found.difference, found.low, found.high) if value)
+    smallest = min(abs(value) for value in (difference.difference, difference.low, difference.high) if value)
     return min(decimals, max(fewest, next((n for n in (0, 1) if round(smallest, n)), 2)))
 
 
-def influence(first: str, second: str, *, found: Difference) -> str:
+def influence(first: str, second: str, *, difference: Difference) -> str:
     """On how few units a difference rests; empty where that is not known.
 
     >>> from evaluator.scoring.significance import Influence
-    >>> found = Difference(-0.4, -0.5, -0.2, 0.0003, influence=Influence(700, 39, 59))
-    >>> print(influence("A", "B", found=found))
+    >>> difference = Difference(-0.4, -0.5, -0.2, 0.0003, influence=Influence(700, 39, 59))
+    >>> print(influence("A", "B", difference=difference))
     Without the 39 of 700 recordings that favour A most, the difference would not be significant; without \
 59, it would have the other sign.
-    >>> influence("A", "B", found=Difference(0.1, -0.2, 0.4, 0.4, influence=Influence(700, None, 2)))
+    >>> influence("A", "B", difference=Difference(0.1, -0.2, 0.4, 0.4, influence=Influence(700, None, 2)))
     'Without the 2 of 700 recordings that favour B most, the difference would have the other sign.'
     """
-    known = found.influence
-    if known is None or not found.difference:
+    known = difference.influence
+    if known is None or not difference.difference:
         return ""
-    better = first if found.difference < 0 else second
+    better = first if difference.difference < 0 else second
     becomes = {"would not be significant": known.n_to_undecided, "would have the other sign": known.n_to_turn}
     parts = [(n, words) for words, n in becomes.items() if n is not None]
     if not parts:
         return ""
     (n, words), *rest = parts
-    of_all = in_words(found.unit, known.n_units)
+    of_all = in_words(difference.unit, known.n_units)
     head = f"Without the {n:,} of {of_all} that favour {better} most, the difference"
     return "; ".join([f"{head} {words}", *(f"without {n:,}, it {words}" for n, words in rest)]) + "."
 
 
 def selection(n_tried: Mapping[str, int]) -> str:
-    """What it is worth to be the best of several, for methods and their numbers of scored submissions.
+    """A sentence on selection among several submissions, for methods and their numbers of scored submissions.
 
     Empty where nothing was chosen.
 
@@ -164,7 +164,7 @@ than it is by about 0.60 and 1.09 standard errors of the difference of two of th
     )
 
 
-def resolution(found: Sequence[Mapping[str, Difference]], *, decimals: int = 2) -> str:
+def resolution(pairs: Sequence[Mapping[str, Difference]], *, decimals: int = 2) -> str:
     """The resolution of each column, from the differences of neighbours on a board; empty without any.
 
     >>> some = [{"mid": Difference(-1, -2, 0, 0.1), "rte": Difference(-1, -1.5, -0.5, 0.01)}]
@@ -172,8 +172,8 @@ def resolution(found: Sequence[Mapping[str, Difference]], *, decimals: int = 2) 
     Resolution: neighbouring methods are told apart, with about 80 % power, if they differ by MiD 1.43, RTE \
 0.71 percentage points (medians of 1 pair).
     """
-    names = dict.fromkeys(name for pair in found for name in pair)
-    known = {name: [r for pair in found if name in pair and (r := pair[name].resolution)] for name in names}
+    names = dict.fromkeys(name for pair in pairs for name in pair)
+    known = {name: [r for pair in pairs if name in pair and (r := pair[name].resolution)] for name in names}
     parts = [
         f"{column_words(name)} {median(values):.{decimals}f}{metric_of(name).unit_of_difference}"
         for name, values in known.items()
@@ -188,8 +188,8 @@ def resolution(found: Sequence[Mapping[str, Difference]], *, decimals: int = 2) 
     )
 
 
-def others(found: Mapping[str, Difference]) -> str:
-    """How many columns besides overall MiD differ significantly; empty where no column has a p.
+def others(differences: Mapping[str, Difference]) -> str:
+    """The number of columns besides overall MiD that differ significantly; empty if no column has a p.
 
     >>> alike, far = Difference(0.1, -0.2, 0.4, 0.5), Difference(-4.1, -5.3, -2.9, 0.0003)
     >>> others({"mid": far, "mid_small": alike, "rte": alike})
@@ -197,10 +197,10 @@ def others(found: Mapping[str, Difference]) -> str:
     >>> others({"mid": alike, "mid_small": far, "rte": alike})
     '1 of the 2 other metrics differs significantly (α = 0.05, uncorrected).'
     """
-    tested = [name for name, gap in found.items() if name != PRIMARY and gap.p_below is not None]
+    tested = [name for name, gap in differences.items() if name != PRIMARY and gap.p_below is not None]
     if not tested:
         return ""
-    n_different = sum(found[name].is_significant for name in tested)
+    n_different = sum(differences[name].is_significant for name in tested)
     differ = "differs" if n_different <= 1 else "differ"
     return (
         f"{n_different or 'None'} of the {len(tested)} other metrics {differ} significantly "

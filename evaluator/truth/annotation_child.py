@@ -46,9 +46,14 @@ def main() -> None:
     answers.flush()
     try:
         files = files_of(sys.stdin.buffer, answers)
-        found = read_files(files, with_ttc=with_ttc, with_boxes=with_boxes, with_frames=with_frames)
-        table, counts = asdict(found.table), found.n_sequences
-        answer = {"table": table, "n_sequences": counts, "boxes": found.boxes, "frames": found.frame_ttc_s}
+        annotated = read_files(files, with_ttc=with_ttc, with_boxes=with_boxes, with_frames=with_frames)
+        table, counts = asdict(annotated.table), annotated.n_sequences
+        answer = {
+            "table": table,
+            "n_sequences": counts,
+            "boxes": annotated.boxes,
+            "frames": annotated.frame_ttc_s,
+        }
         line = json.dumps(answer).encode()
     except Rejected as rejected:
         line = json.dumps(rejected.as_dict()).encode()

@@ -45,14 +45,14 @@ _KINDS: Final[dict[str, tuple[type, ...]]] = {
     "ts_ns": (int,),
     "track_id": (str,),
     "ttc_s": (float,),
-    "places": (int, str),
+    "locations": (int, str),
     "occ_ratio": (float, NoneType),
     "same_lane": (bool, NoneType),
     "box2d": (list, NoneType),
 }
 """What the columns of the child's table hold."""
 _MAX_COMPLAINT_BYTES: Final = 64 * 1024
-_PATIENCE_S: Final = 10.0
+_EXIT_TIMEOUT_S: Final = 10.0
 _EXPECTED: Final = "expected annotations of the toolkit"
 
 
@@ -72,10 +72,10 @@ def read_annotations(
             "unreadable", "The folder has no annotation files; expected at least one *.pkl.", folder.name
         )
     files = sorted(listed, key=lambda path: path.relative_to(folder).parts)
-    place = {path: index for index, path in enumerate(files)}
+    position = {path: index for index, path in enumerate(files)}
     read = _read_apart if HAS_LIMITS else _read_here
-    found = read(folder, files, with_ttc=with_ttc, with_boxes=with_boxes, with_frames=with_frames)
-    return replace(found, listed=[place[path] for path in listed])
+    annotated = read(folder, files, with_ttc=with_ttc, with_boxes=with_boxes, with_frames=with_frames)
+    return replace(annotated, listed=[position[path] for path in listed])
 
 
 def list_files(folder: Path) -> list[Path]:
@@ -199,7 +199,7 @@ def _last_words(child: subprocess.Popen[bytes]) -> str:
         if child.stdin:
             child.stdin.close()
     try:
-        child.wait(timeout=_PATIENCE_S)
+        child.wait(timeout=_EXIT_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         child.kill()  # it has closed its answer, and goes on
         child.wait()

@@ -60,21 +60,21 @@ def read_files(
     `with_frames`, the times to contact of all frames are read, which need not have one.
     Raises `Rejected` for pickles that ask for foreign code and for files of another structure.
     """
-    table, findings, places, n_sequences = Table(), Findings(), list[str](), list[int]()
+    table, findings, locations, n_sequences = Table(), Findings(), list[str](), list[int]()
     boxes, frame_ttc_s = list[list[float]](), list[list[float]]()
     for name, data in files:
-        first = len(places)
+        first = len(locations)
         for camera in _cameras(data, name):
             for sequence in cut_sequences(camera):
-                places.append(f"{name}, sequence {len(places)}")
-                _add_row(table, sequence[-1], findings, places[-1], with_ttc=with_ttc)
+                locations.append(f"{name}, sequence {len(locations)}")
+                _add_row(table, sequence[-1], findings, locations[-1], with_ttc=with_ttc)
                 if with_boxes:
-                    boxes.append([x for seen in sequence for x in _box(seen, findings, places[-1])])
+                    boxes.append([x for seen in sequence for x in _box(seen, findings, locations[-1])])
                 if with_frames:
                     frame_ttc_s.append([_ttc_s(seen) for seen in sequence])
-        n_sequences.append(len(places) - first)
+        n_sequences.append(len(locations) - first)
     findings.raise_if_any()
-    table.places = places
+    table.locations = locations
     return AnnotatedFiles(table, n_sequences, boxes=boxes, frame_ttc_s=frame_ttc_s)
 
 
@@ -159,7 +159,7 @@ def _is_whole(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
 
 
-def _add_row(table: Table, target: Attributes, findings: Findings, place: str, *, with_ttc: bool) -> None:
+def _add_row(table: Table, target: Attributes, findings: Findings, where: str, *, with_ttc: bool) -> None:
     names = {
         # The toolkit takes the last part of a path.
         "bag_stamp": str(target["bag_stamp"]).rsplit("/", 1)[-1],
@@ -168,7 +168,7 @@ def _add_row(table: Table, target: Attributes, findings: Findings, place: str, *
     }
     for name, text in names.items():
         if fault := name_fault(text):
-            findings.add("bad-field", f"{name} is {quoted(text)}: {fault}.", place)
+            findings.add("bad-field", f"{name} is {quoted(text)}: {fault}.", where)
     table.anno_id.append(len(table.anno_id))
     table.bag_stamp.append(names["bag_stamp"])
     table.cam_id.append(names["cam_id"])
@@ -180,8 +180,8 @@ def _add_row(table: Table, target: Attributes, findings: Findings, place: str, *
     if isinstance(ttc_s, int | float) and abs(ttc_s) < 1e308:
         table.ttc_s.append(float(ttc_s))
     else:
-        found = "absent" if ttc_s is None else f"a {type(ttc_s).__name__}"
-        findings.add("bad-field", f"ttc_imu is {found}; expected a number of seconds.", place)
+        kind = "absent" if ttc_s is None else f"a {type(ttc_s).__name__}"
+        findings.add("bad-field", f"ttc_imu is {kind}; expected a number of seconds.", where)
     # No score depends on these: a file that states something else for them is scored all the same.
     table.occ_ratio.append(plain_occ_ratio(target.get("occ_ratio")))
     table.same_lane.append(plain_same_lane(target.get("same_lane")))
@@ -195,14 +195,14 @@ def _ttc_s(seen: Attributes) -> float:
     return float(cast("float", ttc_s)) if _is_number(ttc_s) else math.nan
 
 
-def _box(seen: Attributes, findings: Findings, place: str) -> list[float]:
+def _box(seen: Attributes, findings: Findings, where: str) -> list[float]:
     """The four numbers of `box2d`."""
     box = seen.get("box2d")
     numbers = _numbers(box)
     if numbers is not None:
         return numbers
-    found = "absent" if box is None else f"a {type(box).__name__} of other content"
-    findings.add("bad-field", f"box2d is {found}; expected four numbers, x1, y1, x2 and y2.", place)
+    kind = "absent" if box is None else f"a {type(box).__name__} of other content"
+    findings.add("bad-field", f"box2d is {kind}; expected four numbers, x1, y1, x2 and y2.", where)
     return [math.nan] * 4
 
 

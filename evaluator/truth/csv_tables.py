@@ -56,7 +56,7 @@ class Table:
     ts_ns: list[int] = field(default_factory=list)
     track_id: list[str] = field(default_factory=list)
     ttc_s: list[float] = field(default_factory=list)
-    places: list[int] | list[str] = field(default_factory=list)
+    locations: list[int] | list[str] = field(default_factory=list)
     occ_ratio: list[float | None] = field(default_factory=list)
     same_lane: list[bool | None] = field(default_factory=list)
     box2d: list[list[float] | None] = field(default_factory=list)
@@ -69,10 +69,10 @@ class Table:
 
     def where(self, row: int) -> str:
         """`line 3` of a CSV, or whatever the source calls the row."""
-        if not self.places:
+        if not self.locations:
             return f"row {row + 1}"
-        place = self.places[row]
-        return place if isinstance(place, str) else f"line {place}"
+        location = self.locations[row]
+        return location if isinstance(location, str) else f"line {location}"
 
     def text(self, columns: tuple[str, ...], *, order: list[int] | None = None) -> str:
         """The table as CSV text in the given row order, times to contact in their shortest exact spelling."""
@@ -160,7 +160,7 @@ def read_csv(source: Source, *, with_ttc: bool) -> Table:
 
 
 def _of_objects(header: list[str], columns: tuple[str, ...]) -> dict[str, int]:
-    """Where the columns of objects are; of a manifest, nobody asks for them."""
+    """The positions of the object columns; empty for a manifest."""
     return {name: header.index(name) for name in OBJECT_COLUMNS if name in header and "ttc" in columns}
 
 
@@ -177,21 +177,21 @@ def _read_rows(rows: Any, columns: tuple[str, ...]) -> Table:
     columns = (*columns, UNIT) if UNIT in header else columns
     positions = {name: header.index(name) for name in columns}
     extra = _of_objects(header, columns)
-    table, findings, places = Table(), Findings(), []
+    table, findings, locations = Table(), Findings(), []
     for row in rows:
         if not row:
             continue
         if len(row) != len(header):
-            found = f"The row has {len(row)} fields; expected {len(header)}."
-            findings.add("bad-csv", found, f"line {rows.line_num}")
+            message = f"The row has {len(row)} fields; expected {len(header)}."
+            findings.add("bad-csv", message, f"line {rows.line_num}")
             continue
-        places.append(rows.line_num)
+        locations.append(rows.line_num)
         fields = {name: row[position] for name, position in positions.items()}
         _read_row(fields, table, findings, f"line {rows.line_num}")
         for name, position in extra.items():
             getattr(table, name).append(_of_object(name, row[position], findings, f"line {rows.line_num}"))
     findings.raise_if_any()
-    table.places = places
+    table.locations = locations
     return table
 
 

@@ -168,7 +168,7 @@ class Manifest:
 
     @cached_property
     def _columns(self) -> dict[str, NDArray[Any]]:
-        """What `save` writes, and that of the ground truth as well."""
+        """The arrays that `save` writes, here and in the ground truth."""
         return {
             "anno_id": self.anno_id,
             "bag_stamp": np.array(self.bag_stamp, dtype=np.str_),
@@ -186,7 +186,7 @@ class Manifest:
         """
         table, digest, _ = load_store(path, with_ttc=False)
         manifest = cls.from_table(table)
-        _check_digest(stored=digest, found=manifest.digest, path=path)
+        _check_digest(stored=digest, actual=manifest.digest, path=path)
         return manifest
 
 
@@ -269,7 +269,7 @@ class GroundTruth:
         """Read what `save` wrote; raises `Rejected` when it is damaged or does not match its digest."""
         table, _, digest = load_store(path, with_ttc=True)
         truth = cls.from_table(table)
-        _check_digest(stored=digest, found=truth.digest, path=path)
+        _check_digest(stored=digest, actual=truth.digest, path=path)
         return truth
 
 
@@ -346,7 +346,7 @@ def _find_two_units(findings: Findings, table: Table) -> None:
             findings.add("two-units", message, table.where(row))
 
 
-def _check_digest(*, stored: str, found: str, path: str | os.PathLike[str]) -> None:
-    if stored != found:
-        message = f"The content has the digest {found}; expected {quoted(stored)}, which is stored with it."
+def _check_digest(*, stored: str, actual: str, path: str | os.PathLike[str]) -> None:
+    if stored != actual:
+        message = f"The content has the digest {actual}; expected {quoted(stored)}, which is stored with it."
         raise reject("bad-digest", message, Path(path).name)

@@ -1,4 +1,4 @@
-"""The anno_ids that the toolkit gives the sequences of a folder on this machine, beside those of a manifest.
+"""The anno_ids that the toolkit gives the sequences of a folder on this machine, next to those of a manifest.
 
 The toolkit numbers over the files in the order in which the file system lists them, a manifest over the
 sorted files; within a file the order is the same.
@@ -29,7 +29,7 @@ class Numbering:
 
     @property
     def n_renumbered(self) -> int:
-        """How many anno_ids name another sequence in the toolkit's numbering than in the manifest's."""
+        """The number of anno_ids for which the toolkit and the manifest name different sequences."""
         return int(np.count_nonzero(self.manifest.anno_id[self.rows] != np.arange(len(self.rows))))
 
     @cached_property
@@ -51,15 +51,15 @@ class Numbering:
 def read_numbering(folder: str | Path, *, manifest: Manifest | None = None) -> Numbering:
     """How the toolkit numbers the sequences of an annotation folder on this machine.
 
-    The numbering is told beside that of `manifest`, or of the manifest that is made from the folder. Raises
+    It is compared with that of `manifest`, or of the manifest that is made from the folder. Raises
     `Rejected` for a folder that cannot be read, and where folder and manifest have different sequences.
     """
     folder = Path(folder)
-    found = read_annotations(folder, with_ttc=False)
-    own = Manifest.from_table(found.table)
-    ends = np.cumsum(found.n_sequences)
+    annotated = read_annotations(folder, with_ttc=False)
+    own = Manifest.from_table(annotated.table)
+    ends = np.cumsum(annotated.n_sequences)
     rows = np.concatenate(
-        [np.arange(ends[file] - found.n_sequences[file], ends[file]) for file in found.listed]
+        [np.arange(ends[file] - annotated.n_sequences[file], ends[file]) for file in annotated.listed]
     ).astype(np.intp)
     if manifest is None or manifest.digest == own.digest:
         return Numbering(own, rows)

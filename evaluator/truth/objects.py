@@ -1,4 +1,4 @@
-"""What annotations say of the object of a sequence beside its time to contact, in the target frame.
+"""What annotations state about the object of a sequence in the target frame, except its time to contact.
 
 `occ_ratio` (how much of it is occluded, 0 to 1), `same_lane` (whether it drives in the lane of the camera's
 car) and `box2d` (x1, y1, x2, y2 as parts of the image's width and height). No score and no digest depends on
@@ -83,7 +83,7 @@ def _floats(column: Sequence[Any]) -> Floats | None:
 
 
 def occ_ratio_of(text: str) -> float | None:
-    """How much is occluded.
+    """The occluded part.
 
     >>> occ_ratio_of("0.25"), occ_ratio_of("")
     (0.25, None)
@@ -101,7 +101,7 @@ def occ_ratio_of(text: str) -> float | None:
 
 
 def same_lane_of(text: str) -> bool | None:
-    """Whether the lane is the same.
+    """Whether the object drives in the same lane.
 
     >>> same_lane_of("1"), same_lane_of("False"), same_lane_of("")
     (True, False, None)
@@ -153,7 +153,7 @@ def text_of(value: float | bool | Sequence[float] | None) -> str:
 
 
 def is_box(box: Sequence[float]) -> bool:
-    """Whether these are the corners of a box in parts of an image."""
+    """Whether these four numbers are a box in parts of an image."""
     if len(box) != 4 or not all(abs(number) <= _FARTHEST for number in box):  # NaN is not either
         return False
     x1, y1, x2, y2 = box

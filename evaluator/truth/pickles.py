@@ -58,7 +58,7 @@ class Attributes(dict[Any, Any]):
 
 
 class FewNumbers:
-    """An array of numbers; those of a short one, a box, are kept, and nobody asks for those of others."""
+    """An array of numbers; only a short one, such as a box, keeps its values."""
 
     __slots__ = ("_dtype", "_raw")
     _raw: bytes
@@ -174,7 +174,7 @@ _ALLOWED: Final[dict[tuple[str, str], type]] = {
 
 class _Unpickler(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> type:
-        """What a name stands for; raises `Rejected` for anything that is not data."""
+        """The class of a name; raises `Rejected` for anything that is not data."""
         allowed = _ALLOWED.get((_ALIASES.get(module, module), name))
         if allowed is not None:
             return allowed

@@ -79,7 +79,7 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
         return sentences.sentence(
             **self.context["names"],
             name=self.field_name or "",
-            found=difference,
+            difference=difference,
             decimals=self.context["decimals"],
             withheld=self.context["withheld"],
         )

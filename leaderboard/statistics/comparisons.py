@@ -84,7 +84,7 @@ class Pair:
             first,
             second,
             name=name,
-            found=self.differences[name],
+            difference=self.differences[name],
             decimals=self.first.decimals,
             withheld=self.withheld,
         )
@@ -92,7 +92,7 @@ class Pair:
     def influence(self) -> str:
         """On how few recordings the difference in MiD rests; empty where that is withheld."""
         gap = (self.differences or {}).get(PRIMARY)
-        return sentences.influence(self.first.method, self.second.method, found=gap) if gap else ""
+        return sentences.influence(self.first.method, self.second.method, difference=gap) if gap else ""
 
     def others(self) -> str:
         """How many columns besides overall MiD differ significantly."""

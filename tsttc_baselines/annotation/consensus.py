@@ -91,7 +91,7 @@ def _consensus(time_s: Floats, depth_m: Floats, is_there: Bools, inlier_m: float
 
 
 def _distances(time_s: Floats, depth_m: Floats, i: int, j: int) -> Floats:
-    """How far each frame is from the line through the frames i and j, (q, n)."""
+    """The distance of each frame from the line through the frames i and j, (q, n)."""
     slope = (depth_m[j] - depth_m[i]) / (time_s[j] - time_s[i])
     away = slope * (time_s - time_s[i])
     away -= depth_m

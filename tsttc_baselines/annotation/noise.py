@@ -1,4 +1,4 @@
-"""How noisy labels are, from labels alone: successive ones of a vehicle should differ by the time between.
+"""The noise of labels, from labels alone: successive ones of a vehicle should differ by the time between.
 
     of_range = label_noise(*successive(truth.to_table()))
 
@@ -27,7 +27,7 @@ STEP_S: Final = 1 / FRAME_RATE_HZ
 
 @dataclass(frozen=True, slots=True)
 class LabelNoise:
-    """Of the labels in a TTC range, or `overall`: MiD ×10⁻⁴, None where there is no pair.
+    """The noise of the labels in a TTC range, or `overall`: MiD ×10⁻⁴, None without a pair.
 
     `jitter` is the mean difference between a label and the one that its predecessor lets expect; `noise` is
     the mean error of a label that explains it.
@@ -84,17 +84,17 @@ def label_noise(earlier_s: Floats, later_s: Floats, *, n_frames: int = 10) -> li
     is_defined = np.isfinite(jitter)
     jitter, later_s = jitter[is_defined], later_s[is_defined]
     ranges = [(OVERALL, -math.inf, math.inf), *((r.name, r.low_s, r.high_s) for r in TTC_RANGES)]
-    found = []
+    noises = []
     for name, low_s, high_s in ranges:
         inside = jitter[(later_s >= low_s) & (later_s <= high_s)]
         mean = float(inside.mean()) if inside.size else None
         noise = None if mean is None else mean / jitter_of_noise(n_frames)
-        found.append(LabelNoise(name, int(inside.size), mean, noise))
-    return found
+        noises.append(LabelNoise(name, int(inside.size), mean, noise))
+    return noises
 
 
 def jitter_of_noise(n_frames: int) -> float:
-    """How large the jitter is where the noise is 1: √(2 (1 − ρ)), ρ the correlation of successive labels.
+    """The jitter for a noise of 1: √(2 (1 − ρ)), ρ the correlation of successive labels.
 
     Both are slopes of a least-squares line through q frames with independent errors, and share q − 1 of them:
     with weights a_k = k − (q−1)/2, ρ = Σ a_k a_(k+1) / Σ a_k². One frame: labels without a common cause.

@@ -42,7 +42,7 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class FrameTtc:
-    """What is known of each of n observations: `ttc_s` is NaN where no velocity is.
+    """The estimates for each of n observations: `ttc_s` is NaN without a velocity.
 
     `ttc_s` = −`depth_m` / velocity, of the window `q`, which had `n_frames`, of which `n_inliers` agree;
     `choice` is a key of `REASONS`.
@@ -71,9 +71,12 @@ class Annotation:
 
     def text(self) -> str:
         """A CSV file that `read_truth` reads, with the further columns q, frames, inliers and choice."""
-        found, target = self.frames, self.rows[:, -1]
+        frames, target = self.frames, self.rows[:, -1]
         further = zip(
-            *(column[target].tolist() for column in (found.q, found.n_frames, found.n_inliers, found.choice)),
+            *(
+                column[target].tolist()
+                for column in (frames.q, frames.n_frames, frames.n_inliers, frames.choice)
+            ),
             strict=True,
         )
         head, *lines = self.table.text(COLUMNS).splitlines()
@@ -98,8 +101,8 @@ def annotate(
     is_usable = has_box & ~is_small & ~tracks.is_truncated
     rows = np.array(list(_sequences(tracks, np.flatnonzero(is_usable), cut)), dtype=np.intp)
     rows = rows.reshape(-1, N_FRAMES)
-    is_said, is_defined = _is_said(frames.ttc_s[rows[:, -1]])
-    kept = rows[is_said & is_defined]
+    is_finite, is_defined = _finite_and_defined(frames.ttc_s[rows[:, -1]])
+    kept = rows[is_finite & is_defined]
     n_of_track = Counter(tracks.key)
     counts = {
         "observations": tracks.n_observations,
@@ -110,8 +113,8 @@ def annotate(
         "small_box": int(np.count_nonzero(is_small & ~tracks.is_truncated)),
         "without_radar": int(np.isnan(tracks.radar_mps).sum()) if tracks.has_radar else 0,
         "sequences": len(kept),
-        "standing_still": int(np.count_nonzero(~is_said)),
-        "undefined_error": int(np.count_nonzero(is_said & ~is_defined)),
+        "standing_still": int(np.count_nonzero(~is_finite)),
+        "undefined_error": int(np.count_nonzero(is_finite & ~is_defined)),
         **{f"choice_{reason}": int((frames.choice[kept[:, -1]] == reason).sum()) for reason in REASONS},
     }
     if not len(kept):
@@ -124,8 +127,8 @@ def annotate(
     return Annotation(_table(tracks, frames, kept), frames, kept, counts)
 
 
-def _is_said(ttc_s: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which times to contact are finite, and which have an error: those of a truth are both."""
+def _finite_and_defined(ttc_s: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which times to contact are finite, and which have a defined error: a ground truth needs both."""
     alpha = scale_ratio_10hz(ttc_s)
     with np.errstate(invalid="ignore"):
         is_defined = (alpha > 0) & np.isfinite(alpha) & ((ttc_s > 0) | (ttc_s < -0.1))
@@ -209,11 +212,11 @@ def past_frames(tracks: Tracks, *, n_frames: int) -> tuple[Indices, NDArray[np.b
     names = {key: number for number, key in enumerate(dict.fromkeys(tracks.key))}
     track = np.array([names[key] for key in tracks.key])
     order = np.argsort(track, kind="stable")  # within a track the rows stand in the order of time
-    place = np.arange(n) - np.arange(n_frames)[::-1, np.newaxis]
+    position = np.arange(n) - np.arange(n_frames)[::-1, np.newaxis]
     index = np.empty((n_frames, n), dtype=np.intp)
-    index[:, order] = order[np.maximum(place, 0)]
+    index[:, order] = order[np.maximum(position, 0)]
     is_there = np.empty((n_frames, n), dtype=np.bool_)
-    is_there[:, order] = place >= 0
+    is_there[:, order] = position >= 0
     return index, is_there & (track[index] == track)
 
 

@@ -57,7 +57,7 @@ class Tracks:
 
     @property
     def n_observations(self) -> int:
-        """How many rows there are."""
+        """The number of rows."""
         return len(self.key)
 
 

@@ -1,4 +1,4 @@
-"""`tsttc baseline ablate`: one setting of Pixel MSE varied, with the paper's table beside the own scores."""
+"""`tsttc baseline ablate`: one setting of Pixel MSE varied, with the paper's table next to the own scores."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ NAMES: Final = ("bins", "frame-gap", "shift", "expansion")
 def ablate(
     *, name: str, folder: Path, truth_path: Path | None, variant: str, n_processes: int, as_json: bool
 ) -> None:
-    """Run Pixel MSE on FOLDER for each value of one setting, and print its scores beside the paper's.
+    """Run Pixel MSE on FOLDER for each value of one setting, and print its scores next to the paper's.
 
     The paper's numbers are of TSTTC's validation split. On other recordings the errors are different:
     compare only how they change from one value to the next. The paper has no table for the expansion.
@@ -77,12 +77,12 @@ def _truth(folder: Path, path: Path | None) -> GroundTruth:
     from evaluator import read_truth  # noqa: PLC0415 -- numpy, which --help can do without
 
     own = folder / TRUTH
-    found = path or (own if own.exists() else folder)
-    if found == folder and next(folder.rglob("*.pkl"), None) is None:
+    source = path or (own if own.exists() else folder)
+    if source == folder and next(folder.rglob("*.pkl"), None) is None:
         message = f"{folder} has neither {TRUTH} nor annotation files; expected one of them, or --truth FILE."
         raise click.UsageError(message)
-    with naming(found):
-        return read_truth(found)
+    with naming(source):
+        return read_truth(source)
 
 
 def _document(

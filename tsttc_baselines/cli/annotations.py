@@ -79,8 +79,8 @@ def annotate(
     """
     if source.is_dir() != (input_format == "kitti"):
         expected = "a folder of labels" if input_format == "kitti" else "a table (folders: --format kitti)"
-        found = "a folder" if source.is_dir() else "a file"
-        message = f"{source} is {found}; --format {input_format} expects {expected}."
+        kind = "a folder" if source.is_dir() else "a file"
+        message = f"{source} is {kind}; --format {input_format} expects {expected}."
         raise click.UsageError(message)
     from tsttc_baselines.annotation import pipeline  # noqa: PLC0415 -- numpy, which --help can do without
 
@@ -116,7 +116,7 @@ def _box_table(tracks: Tracks, annotation: Annotation) -> str:
 
 
 def _in_words(annotation: Annotation, output: Path, *, has_radar: bool) -> Iterator[str]:
-    """What was made, what was left out and why, and how the values were chosen."""
+    """Lines on the sequences made and left out, the reasons, and the choice of velocities."""
     counts = annotation.counts
     recordings = len(set(annotation.table.bag_stamp))
     yield f"{output}: {_n(counts['sequences'], 'sequence')} of {_n(recordings, 'recording')}."

@@ -45,11 +45,11 @@ def noise(*, source: Path, n_frames: int, as_json: bool) -> None:
     """
     from tsttc_baselines.annotation.noise import label_noise  # noqa: PLC0415 -- numpy, which --help can do without
 
-    found = label_noise(*_pairs(source), n_frames=n_frames)
+    noises = label_noise(*_pairs(source), n_frames=n_frames)
     if as_json:
-        echo_json({"frames": n_frames, "ranges": [asdict(each) for each in found]})
+        echo_json({"frames": n_frames, "ranges": [asdict(each) for each in noises]})
         return
-    click.echo("\n".join(_in_words(found, n_frames)))
+    click.echo("\n".join(_in_words(noises, n_frames)))
 
 
 def _pairs(source: Path) -> tuple[Floats, Floats]:
@@ -60,16 +60,16 @@ def _pairs(source: Path) -> tuple[Floats, Floats]:
     own = source / TRUTH
     with naming(own if own.is_file() else source):
         if source.is_dir() and not own.is_file():
-            found = read_annotations(source, with_ttc=False, with_frames=True)
-            return successive_in_sequences(found.frame_ttc_s)
+            annotated = read_annotations(source, with_ttc=False, with_frames=True)
+            return successive_in_sequences(annotated.frame_ttc_s)
         return successive(read_truth(own if source.is_dir() else source).to_table())
 
 
-def _in_words(found: Sequence[LabelNoise], n_frames: int) -> Iterator[str]:
+def _in_words(noises: Sequence[LabelNoise], n_frames: int) -> Iterator[str]:
     """The table, its units, and what it takes for granted."""
     ranges = known_ranges()
     rows = [[Cell(text, is_bold=True) for text in ("TTC range", "pairs", "jitter", "noise")]]
-    for each in found:
+    for each in noises:
         name = ranges[each.name].seconds if each.name in ranges else each.name
         values = [NO_VALUE if value is None else f"{value:.1f}" for value in (each.jitter, each.noise)]
         rows.append([Cell(name), Cell(f"{each.n_pairs:,}"), *map(Cell, values)])

@@ -1,4 +1,4 @@
-"""How far a run is: a bar with rate and time left on a terminal, elsewhere a line every few seconds."""
+"""The progress of a run: a bar with rate and time left on a terminal, elsewhere a line every few seconds."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ EVERY_S: Final = 5.0
 
 @contextmanager
 def shown_progress(title: str, *, total: int) -> Iterator[Callable[[int], None]]:
-    """A function that is told how many of `total` sequences are done, at least every second."""
+    """Yield a function to call at least every second with the number of `total` sequences that are done."""
     if not sys.stderr.isatty():
         yield _Lines(total).show
         return
@@ -60,16 +60,16 @@ class _Lines:
 
     def __init__(self, total: int) -> None:
         self._total = total
-        self._began_s = self._told_s = time.monotonic()
+        self._began_s = self._shown_s = time.monotonic()
         self._n_first: int | None = None
 
     def show(self, n_done: int) -> None:
         now_s = time.monotonic()
         if self._n_first is None:
             self._n_first, self._began_s = n_done, now_s
-        if now_s - self._told_s < EVERY_S:
+        if now_s - self._shown_s < EVERY_S:
             return
-        self._told_s = now_s
+        self._shown_s = now_s
         per_s = (n_done - self._n_first) / max(now_s - self._began_s, 1e-9)
         left = f", {(self._total - n_done) / per_s:,.0f} s left" if per_s > 0 else ""
         click.echo(f"{n_done:,} of {self._total:,} sequences, {per_s:,.1f}/s{left}", err=True)

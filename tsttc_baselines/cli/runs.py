@@ -145,9 +145,9 @@ def _given(method: Method, options: Mapping[str, Value]) -> dict[str, Value]:
     known = {parameter.name: parameter.option for parameter in method.parameters}
     for name in given:
         if name not in known:
-            found = "--" + name.replace("_", "-")
+            option = "--" + name.replace("_", "-")
             expected = f"its options are {', '.join(known.values())}" if known else "it has no options"
-            raise click.UsageError(f"{method.name} has no option {found}; {expected}.")
+            raise click.UsageError(f"{method.name} has no option {option}; {expected}.")
     return given
 
 

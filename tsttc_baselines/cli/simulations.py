@@ -170,12 +170,12 @@ def render(
 
 def _require_empty(folder: Path) -> None:
     try:
-        found = next(folder.iterdir(), None) if folder.exists() else None
+        entry = next(folder.iterdir(), None) if folder.exists() else None
     except OSError as error:
         message = f"{folder} cannot be read: {error.strerror}."
         raise click.BadParameter(message, param_hint="FOLDER") from None
-    if found is not None:
-        message = f"{folder} has {found.name} in it; expected a new or empty folder."
+    if entry is not None:
+        message = f"{folder} has {entry.name} in it; expected a new or empty folder."
         raise click.BadParameter(message, param_hint="FOLDER")
 
 

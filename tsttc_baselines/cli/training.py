@@ -188,9 +188,9 @@ def _use(recipe: dict[str, Any], *, start: Weights | None) -> Use:
 
 def _contradiction(name: str, value: Any, use: Use) -> str:
     flag, words = _USE[name]
-    found = value if isinstance(value, str) else f"{value:g}"
+    given = value if isinstance(value, str) else f"{value:g}"
     return (
-        f"{flag} {found} contradicts the weights of --start, which were trained with "
+        f"{flag} {given} contradicts the weights of --start, which were trained with "
         f"{words.format(getattr(use, name))}; leave it out, or start without weights."
     )
 
@@ -219,8 +219,8 @@ def _folder_source(path: Path) -> Source:
 
 
 def _tell(epoch: Epoch) -> None:
-    place = f"epoch {epoch.number}: loss {epoch.loss:.3f}, " if epoch.number else "before epoch 1: "
-    line = f"{place}MiD {epoch.mid:.1f}, RTE {epoch.rte:.1f} %"
+    prefix = f"epoch {epoch.number}: loss {epoch.loss:.3f}, " if epoch.number else "before epoch 1: "
+    line = f"{prefix}MiD {epoch.mid:.1f}, RTE {epoch.rte:.1f} %"
     if epoch.n_left_out:
         line += f"; {counted(epoch.n_left_out, 'sequence')} left out"
     click.echo(line, err=True)

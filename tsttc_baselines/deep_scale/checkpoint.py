@@ -38,8 +38,8 @@ def read_entry(archive: zipfile.ZipFile, name: str, *, n_bytes: int) -> bytes:
     except (zipfile.BadZipFile, EOFError, OSError, RuntimeError, NotImplementedError, ValueError) as error:
         raise reject("bad-weights", f"The entry {quoted(name)} cannot be read ({error}).") from None
     if len(data) != n_bytes:
-        found = f"more than {n_bytes:,}" if len(data) > n_bytes else f"{len(data):,}"
-        message = f"The entry {quoted(name)} has {found} bytes; expected {n_bytes:,}."
+        size = f"more than {n_bytes:,}" if len(data) > n_bytes else f"{len(data):,}"
+        message = f"The entry {quoted(name)} has {size} bytes; expected {n_bytes:,}."
         raise reject("bad-weights", message)
     return data
 
@@ -123,7 +123,7 @@ class _Storage:
 
 @dataclass(frozen=True, slots=True)
 class _Tensor:
-    """What the pickle says of a tensor; nothing of it is believed before `fault` has looked."""
+    """The pickle's entry for a tensor, untrusted until `fault` has checked it."""
 
     storage: Any
     offset: Any
@@ -131,7 +131,7 @@ class _Tensor:
     stride: Any
 
     def fault(self, expected: Shape) -> str | None:
-        """What is wrong with it, to follow its name; None where it has this shape and lies in one piece."""
+        """The fault, to follow its name; None if it has this shape and is contiguous."""
         if self.shape != expected:
             return f"has the shape {self.shape}; expected {expected}"
         if not isinstance(self.storage, _Storage) or self.storage.kind != "FloatStorage":
@@ -160,7 +160,7 @@ class _Notes(dict[Any, Any]):
 
 
 class _Answer:
-    """What stands for a name of the pickle. It is made for one reading and has nothing to be changed."""
+    """The stand-in for a name of the pickle; it is made for one reading and has no mutable state."""
 
     __slots__ = ("name",)
 

@@ -1,4 +1,4 @@
-"""What the network sees of a pair: a crop of each frame about its box, with float boxes in its pixels.
+"""The network's input for a pair: a crop of each frame about its box, with float boxes in its pixels.
 
 The toolkit pads all crops to 300 × 300 pixels. These are as large as the network looks, which is several
 times faster. Outside of the frame its border is repeated, so that no sequence is dropped and no centre moves.

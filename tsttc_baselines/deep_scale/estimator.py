@@ -67,7 +67,7 @@ class DeepScale:
         return Estimate(scale_ratio, confidence=float(confidences[best[0]]))
 
     def crops(self, clip: Clip, *, frame_gap: int) -> CropPair:
-        """What the network sees; raises as a call does."""
+        """The network's input; raises as a call does."""
         return cut(*_usable(clip, frame_gap=frame_gap), use=self._use)
 
     def confidences(self, pair: CropPair) -> Floats:
@@ -119,8 +119,8 @@ def network_logits(operations: Operations, pairs: Sequence[CropPair], *, use: Us
         )
         for pair in pairs
     ]
-    found = similarities(operations, target, reference, sampling, similarity=use.similarity)
-    return operations.linear("head.scale_preds", found)
+    head_input = similarities(operations, target, reference, sampling, similarity=use.similarity)
+    return operations.linear("head.scale_preds", head_input)
 
 
 def stacked(crops: Sequence[Crop]) -> Pixels:

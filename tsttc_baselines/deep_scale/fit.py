@@ -1,4 +1,4 @@
-"""The estimate from a fit: the reference frame is cut anew until its features lie on those of the target.
+"""The estimate from a fit: the reference frame is cut again until its features match those of the target.
 
 The network's head knows 20 scale ratios, 4.5 % apart, and shifts by whole cells. Here scale ratio and shift
 are continuous. The target's box is cut with a margin; the reference frame is cut on the same grid, about a
@@ -74,8 +74,8 @@ _NORMAL_RIDGE: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """What of a frame a grid shows: `scale_ratio` times its size, about `centre` (2,), in pixels."""
+class View:
+    """The part of a frame that a grid shows: `scale_ratio` times its size, about `centre` (2,), in pixels."""
 
     scale_ratio: float
     centre: Floats
@@ -109,21 +109,21 @@ class Grid:
             pixel_size,
         )
 
-    def cut(self, frame: Image, place: Place) -> Pixels:
-        """(3, rows, columns): the frame (in colour) on this grid at a place. Its border repeats."""
-        step = self.pixel_size * place.scale_ratio
-        blur = _BLUR * max(self.pixel_size, 1.0) * place.scale_ratio
+    def cut(self, frame: Image, view: View) -> Pixels:
+        """(3, rows, columns): a view of the frame (in colour) on this grid; the frame's border repeats."""
+        step = self.pixel_size * view.scale_ratio
+        blur = _BLUR * max(self.pixel_size, 1.0) * view.scale_ratio
         down, across = (
             Kernel.at(middle - 0.5 + step * offsets, blur=blur, length=length)
             for middle, offsets, length in zip(
-                place.centre[::-1].tolist(), self.offsets(), frame.shape[:2], strict=True
+                view.centre[::-1].tolist(), self.offsets(), frame.shape[:2], strict=True
             )
         )
         pixels = frame[down.pixels, across.pixels].astype(np.float32).transpose(2, 0, 1)
         return np.asarray(down.weights @ pixels @ across.weights.T)
 
     def offsets(self) -> tuple[Floats, Floats]:
-        """Of the rows and of the columns from the middle of the box, in pixels of the grid."""
+        """The offsets of the rows and the columns from the middle of the box, in pixels of the grid."""
         rows, columns = (np.arange(length, dtype=np.float64) - (length - 1) / 2 for length in self.shape)
         return rows, columns
 
@@ -132,19 +132,19 @@ class Grid:
         """From the middle of the box to its farther edge, in pixels of the grid."""
         return 0.5 * float(max(part.stop - part.start for part in (self.rows, self.columns)))
 
-    def moved(self, place: Place, step: Floats) -> Place:
-        """The place after a step (3,): growth of ln α, and the shift in x and y in pixels of the grid."""
+    def moved(self, view: View, step: Floats) -> View:
+        """The view after a step (3,): growth of ln α, and the shift in x and y in pixels of the grid."""
         limits = _MAX_STEP * np.array([1.0, self.reach, self.reach])
         growth, *shift = np.clip(step, -limits, limits)
-        centre = place.centre + place.scale_ratio * self.pixel_size * np.array(shift)
-        return Place(place.scale_ratio * float(np.exp(growth)), centre)
+        centre = view.centre + view.scale_ratio * self.pixel_size * np.array(shift)
+        return View(view.scale_ratio * float(np.exp(growth)), centre)
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """A place, and how far from 0 the differences of the features were before the last step, squared."""
+    """A view, and how far from 0 the differences of the features were before the last step, squared."""
 
-    place: Place
+    view: View
     unlike: float
 
 
@@ -161,49 +161,49 @@ def fitted_scale_ratio(
     features are more alike. Raises `Unusable` for boxes without a size.
     """
     starts = np.clip([near, scale_ratio_of_two(*boxes, measure="sqrt-area")], *_STARTS)
-    places = [Place(start, centre_of(boxes[0])) for start in starts.tolist()]
+    views = [View(start, centre_of(boxes[0])) for start in starts.tolist()]
     for box_px in (COARSE_PX, FINE_PX):
-        fits = _fits(operations, frames, boxes[1], places, box_px=box_px)
-        places = [min(fits, key=attrgetter("unlike")).place]
-    return places[0].scale_ratio
+        fits = _fits(operations, frames, boxes[1], views, box_px=box_px)
+        views = [min(fits, key=attrgetter("unlike")).view]
+    return views[0].scale_ratio
 
 
-def shown_at(operations: Operations, frames: tuple[Image, Image], box: Floats, place: Place) -> Place:
-    """The place in the reference frame to which the steps on the coarse grid lead from this one."""
-    return _fits(operations, frames, box, [place], box_px=COARSE_PX)[0].place
+def shown_at(operations: Operations, frames: tuple[Image, Image], box: Floats, view: View) -> View:
+    """The view of the reference frame to which the steps on the coarse grid lead from this one."""
+    return _fits(operations, frames, box, [view], box_px=COARSE_PX)[0].view
 
 
 def _fits(
     operations: Operations,
     frames: tuple[Image, Image],
     box: Floats,
-    places: Sequence[Place],
+    views: Sequence[View],
     *,
     box_px: float,
 ) -> list[Fit]:
-    """Where the steps on a grid over the target's box lead from each of the places in the reference frame."""
+    """Fit each view of the reference frame by steps on a grid over the target's box."""
     reference, target = frames
     grid = Grid.over(box, box_px=box_px)
-    wanted = _features(operations, grid.cut(target, Place(1.0, centre_of(box))))
-    return [_approached(operations, reference, place, grid=grid, target=wanted) for place in places]
+    wanted = _features(operations, grid.cut(target, View(1.0, centre_of(box))))
+    return [_approached(operations, reference, view, grid=grid, target=wanted) for view in views]
 
 
-def _approached(operations: Operations, reference: Image, place: Place, *, grid: Grid, target: Pixels) -> Fit:
+def _approached(operations: Operations, reference: Image, view: View, *, grid: Grid, target: Pixels) -> Fit:
     unlike = np.inf
     for _ in range(_N_STEPS):
-        seen = _features(operations, grid.cut(reference, place))
+        seen = _features(operations, grid.cut(reference, view))
         rows, columns = (offsets.astype(np.float32) for offsets in grid.offsets())
         design, errors = equations(np, target, seen, grid=grid, offsets=(rows, columns))
         unlike = float(np.square(errors).sum(axis=0).mean())
         metric, weights = weighting(np, design, errors)
         step = solution(np, metric @ design, metric @ errors, weights)
-        place = grid.moved(place, step.astype(np.float64))
-    return Fit(place, unlike)
+        view = grid.moved(view, step.astype(np.float64))
+    return Fit(view, unlike)
 
 
 def _features(operations: Operations, pixels: Pixels) -> Pixels:
-    found = features(operations, operations.constant(pixels[np.newaxis]))
-    return np.asarray(evened(operations.values(found)[0]))
+    feature_map = features(operations, operations.constant(pixels[np.newaxis]))
+    return np.asarray(evened(operations.values(feature_map)[0]))
 
 
 def evened(maps: Array) -> Array:
@@ -235,7 +235,7 @@ def _shifted(part: slice, by: int) -> slice:
 
 
 def weighting(xp: Any, design: Array, errors: Array) -> tuple[Array, Array]:
-    """How the equations count: (24, 24), by which features are multiplied, and (p,), the pixels' weights."""
+    """The weights of the equations: (24, 24), by which features are multiplied, and (p,) of the pixels."""
     weights = _weights(xp, errors)
     covariance = (errors * weights) @ errors.T / weights.sum()
     ones = xp.ones_like(covariance[0])

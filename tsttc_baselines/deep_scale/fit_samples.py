@@ -1,4 +1,4 @@
-"""What the fit learns from (`fit`): two crops of a pair on one grid, and how far they are apart."""
+"""Training samples of the fit (`fit`): two crops of a pair on one grid, and how far they are apart."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tsttc_baselines.boxes import centre_of
 from tsttc_baselines.clips import Image
-from tsttc_baselines.deep_scale.fit import COARSE_PX, FINE_PX, Grid, Place, shown_at
+from tsttc_baselines.deep_scale.fit import COARSE_PX, FINE_PX, Grid, View, shown_at
 from tsttc_baselines.deep_scale.network import Operations
 
 Floats = NDArray[np.float64]
@@ -55,12 +55,12 @@ def fit_sample(
     """
     reference, target = frames
     reference_box, box = boxes
-    there = shown_at(operations, frames, box, Place(scale_ratio, centre_of(reference_box)))
+    there = shown_at(operations, frames, box, View(scale_ratio, centre_of(reference_box)))
     is_coarse = rng.random() < _SHARE_COARSE
     grid = Grid.over(box, box_px=COARSE_PX if is_coarse else FINE_PX * _LEAST_FINE ** rng.random())
     growth_sd, shift_sd = _NEAR if rng.random() < _SHARE_NEAR else _FAR
     error = growth_sd * rng.normal()
     shift = shift_sd * rng.normal(size=2) * grid.pixel_size * scale_ratio
-    start = Place(scale_ratio * float(np.exp(error)), there.centre + shift)
-    cuts = (grid.cut(target, Place(1.0, centre_of(box))), grid.cut(reference, start))
+    start = View(scale_ratio * float(np.exp(error)), there.centre + shift)
+    cuts = (grid.cut(target, View(1.0, centre_of(box))), grid.cut(reference, start))
     return FitSample(np.stack(cuts), grid, -error)

@@ -37,7 +37,7 @@ class NumpyLayers:
     @cached_property
     def _folded(self) -> dict[str, tuple[Floats, Floats]]:
         """Of each block, the kernel (k, k · channels, channels out) and the bias, batch norm included."""
-        found = {}
+        folded = {}
         for key, weight in self.tensors.items():
             name, is_conv, _ = key.partition(".conv.weight")
             if not is_conv:
@@ -46,14 +46,14 @@ class NumpyLayers:
             gain = norm["weight"] / np.sqrt(norm["running_var"] + BN_EPSILON)
             kernel = (weight * gain[:, None, None, None]).transpose(2, 3, 1, 0)
             rows = kernel.reshape(len(kernel), -1, len(weight)).astype(np.float32)
-            found[name] = (rows, (norm["bias"] - gain * norm["running_mean"]).astype(np.float32))
-        return found
+            folded[name] = (rows, (norm["bias"] - gain * norm["running_mean"]).astype(np.float32))
+        return folded
 
     def block(self, name: str, images: Floats, *, stride: int = 1) -> Floats:
         """As `network.Operations`."""
         kernel, bias = self._folded[name]
-        found = [convolved(each, kernel, bias, stride=stride) for each in _channels_last(images)]
-        return _channels_first(silu(np.stack(found)))
+        outputs = [convolved(each, kernel, bias, stride=stride) for each in _channels_last(images)]
+        return _channels_first(silu(np.stack(outputs)))
 
     def upsampled(self, name: str, images: Floats) -> Floats:
         """As `network.Operations`."""
@@ -85,9 +85,9 @@ class NumpyLayers:
         """As `network.Operations`."""
         return np.asarray(values @ self.tensors[f"{name}.weight"].T + self.tensors[f"{name}.bias"])
 
-    def values(self, found: Floats) -> Floats:
+    def values(self, array: Floats) -> Floats:
         """As `network.Operations`."""
-        return found
+        return array
 
 
 def _channels_last(images: Floats) -> Floats:
@@ -117,36 +117,36 @@ def convolved(image: Floats, kernel: Floats, bias: Floats, *, stride: int = 1) -
     pad = size // 2
     height, width = (-(-side // stride) for side in image.shape[:2])
     padded = np.pad(image, ((pad, pad), (pad, pad), (0, 0)))
-    found = np.empty((height, width, kernel.shape[2]), dtype=np.float32)
+    output = np.empty((height, width, kernel.shape[2]), dtype=np.float32)
     n_rows = max(1, _MAX_STRIP // (width * size * channels * stride))
     for first in range(0, height, n_rows):
         last = min(height, first + n_rows)
         rows = padded[first * stride : (last - 1) * stride + size]
         patches = sliding_window_view(rows.reshape(len(rows), -1), size * channels, axis=1)
         patches = np.ascontiguousarray(patches[:, :: stride * channels][:, :width])
-        strip = found[first:last]
+        strip = output[first:last]
         strip[:] = bias
         for row, part in enumerate(kernel):
             strip += patches[row : row + (last - first - 1) * stride + 1 : stride] @ part
-    return found
+    return output
 
 
 def doubled(images: Floats, kernel: Floats) -> Floats:
     """(b, 2h, 2w, channels out): the transposed convolution of `images` (b, h, w, channels) with stride 2,
     padding 1 and output padding 1; `kernel` is (channels, channels out, 3, 3).
 
-    An even place of the output sees the middle of the kernel at one place of the input, an odd one the two
-    ends at two: those after the last are 0.
+    An even position of the output sees the middle of the kernel at one position of the input, an odd one the
+    two ends at two: those after the last are 0.
     """
     b, height, width, _ = images.shape
-    found = np.empty((b, 2 * height, 2 * width, kernel.shape[1]), dtype=np.float32)
+    output = np.empty((b, 2 * height, 2 * width, kernel.shape[1]), dtype=np.float32)
     after = np.pad(images, ((0, 0), (0, 1), (0, 1), (0, 0)))
     ends = {0: ((1, 0),), 1: ((2, 0), (0, 1))}
     for odd_row, rows in ends.items():
         for odd_column, columns in ends.items():
-            found[:, odd_row::2, odd_column::2] = sum(
+            output[:, odd_row::2, odd_column::2] = sum(
                 after[:, down : down + height, right : right + width] @ kernel[:, :, row, column]
                 for row, down in rows
                 for column, right in columns
             )
-    return found
+    return output

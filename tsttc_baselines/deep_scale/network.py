@@ -41,7 +41,7 @@ Similarity = Literal["dot", "cosine"]
 
 
 class Operations(Protocol):
-    """What the network needs of numpy or torch. Names are those of the weights; images are (b, c, h, w)."""
+    """The operations, by numpy or torch. Names are those of the weights; images are (b, c, h, w)."""
 
     def block(self, name: str, images: Array, *, stride: int = 1) -> Array:
         """Convolution, batch normalisation and SiLU. The size is kept, or halved and rounded up."""
@@ -75,28 +75,28 @@ class Operations(Protocol):
         """The linear layer on the last axis."""
         ...
 
-    def values(self, found: Array) -> NDArray[np.float32]:
+    def values(self, array: Array) -> NDArray[np.float32]:
         """An array's numbers, for numpy."""
         ...
 
 
 def features(operations: Operations, images: Array) -> Array:
     """(b, 24, h, w): the features of `images` (b, 3, h, w); h and w are even."""
-    found = operations.block("backbone.stem", images, stride=2)
-    found = operations.block("backbone.stage2.0", found)
-    deep = operations.block("backbone.stage2.1.conv1", found)
+    maps = operations.block("backbone.stem", images, stride=2)
+    maps = operations.block("backbone.stage2.0", maps)
+    deep = operations.block("backbone.stage2.1.conv1", maps)
     for number in range(_N_BOTTLENECKS):
         name = f"backbone.stage2.1.m.{number}"
         deep = operations.block(f"{name}.conv2", operations.block(f"{name}.conv1", deep)) + deep
-    flat = operations.block("backbone.stage2.1.conv2", found)
-    found = operations.block("backbone.stage2.1.conv3", operations.joined(deep, flat))
-    found = operations.upsampled("backbone.upsample", found)
-    return operations.block("backbone.stage3.1", operations.block("backbone.stage3.0", found))
+    flat = operations.block("backbone.stage2.1.conv2", maps)
+    maps = operations.block("backbone.stage2.1.conv3", operations.joined(deep, flat))
+    maps = operations.upsampled("backbone.upsample", maps)
+    return operations.block("backbone.stage3.1", operations.block("backbone.stage3.0", maps))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sampling:
-    """Where the features of one pair are sampled: matrices as `roi_align.sampling_matrix` makes them.
+    """The sampling of one pair's features: matrices as `roi_align.sampling_matrix` makes them.
 
     The target's are (3 · 52, h) and (3 · 52, w), for the three shifts one below the other: 50 cells with a
     border of zeros, whose place is the shift. The reference's are (n, 52, h) and (n, 52, w), one for each

@@ -25,14 +25,14 @@ def sampling_matrix(low: float, high: float, *, n_cells: int, length: int) -> ND
     n_samples = max(1, math.ceil(side / n_cells))
     cell = side / n_cells
     offsets = (np.arange(n_samples) + 0.5) / n_samples
-    places = low + cell * (np.arange(n_cells)[:, np.newaxis] + offsets)
-    inside = (places >= -1.0) & (places <= length)
-    held = np.clip(places, 0.0, length - 1)
-    below = np.minimum(held.astype(np.intp), length - 1)
+    samples = low + cell * (np.arange(n_cells)[:, np.newaxis] + offsets)
+    inside = (samples >= -1.0) & (samples <= length)
+    clamped = np.clip(samples, 0.0, length - 1)
+    below = np.minimum(clamped.astype(np.intp), length - 1)
     above = np.minimum(below + 1, length - 1)
-    part = held - below
+    part = clamped - below
     matrix = np.zeros((n_cells, length))
-    cells = np.broadcast_to(np.arange(n_cells)[:, np.newaxis], places.shape)
+    cells = np.broadcast_to(np.arange(n_cells)[:, np.newaxis], samples.shape)
     np.add.at(matrix, (cells, below), inside * (1 - part))
     np.add.at(matrix, (cells, above), inside * part)
     return matrix / n_samples

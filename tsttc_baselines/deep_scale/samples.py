@@ -57,7 +57,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """What the network sees of a pair, and what it should say; and what the fit sees, where it learns too."""
+    """The network's input for a pair and its label; the fit's sample if the fit is trained too."""
 
     crops: CropPair
     scale_ratio: float
@@ -92,16 +92,16 @@ class RenderedSequences:
 
     @property
     def truth(self) -> GroundTruth:
-        """As of a source."""
+        """As `Source`."""
         return self.split.truth
 
     @property
     def scale_ratios(self) -> Floats:
-        """As of a source: of the distances. A time to contact says less where the vehicle brakes."""
+        """As `Source`, from the distances: a time to contact is less exact while the vehicle brakes."""
         return self.split.gap_m[:, TARGET] / self.split.gap_m[:, TARGET - FRAME_GAP]
 
     def clip(self, row: int) -> Clip:
-        """As of a source."""
+        """As `Source`."""
         if row not in self._rendered:
             self._rendered[row] = render(self.split, anno_id=row, seed=self.seed)
         return self._rendered[row].clip
@@ -119,7 +119,7 @@ class FolderSequences:
 
     @classmethod
     def of(cls, folder: SequenceFolder, truth: GroundTruth) -> FolderSequences:
-        """Those of `truth`, by their natural keys; raises `Rejected` where the folder lacks one."""
+        """The sequences of `truth`, by their natural keys; raises `Rejected` if the folder lacks one."""
         row_of = {key: row for row, key in enumerate(folder.manifest.natural_keys)}
         missing = [key for key in truth.manifest.natural_keys if key not in row_of]
         if missing:
@@ -132,11 +132,11 @@ class FolderSequences:
 
     @property
     def scale_ratios(self) -> Floats:
-        """As of a source."""
+        """As `Source`."""
         return ttc_to_scale_ratio(self.truth.ttc_s, fps_hz=fps_of_gap(FRAME_GAP))
 
     def clip(self, row: int) -> Clip:
-        """As of a source; asking for a frame raises `SequenceFault` where it cannot be had."""
+        """As `Source`; the clip raises `SequenceFault` for a frame that cannot be read."""
         return self.folder.clip(self.rows[row], cache=self._cache)
 
 
@@ -153,7 +153,7 @@ def usable_pair(source: Source, row: int, *, scale_ratio: float) -> Pair:
 def batches(
     source: Source, *, use: Use, size: int, rng: np.random.Generator, fitting: Operations | None = None
 ) -> Iterator[tuple[int, list[Sample]]]:
-    """Batches of an epoch, each with the number of sequences it stands for: all rows once, in a random order.
+    """Batches of an epoch, each with its number of sequences: all rows once, in a random order.
 
     Sequences that cannot be used, or whose α the network cannot say, are left out. With the network as
     `fitting`, samples have what the fit learns from.
@@ -170,9 +170,9 @@ def batches(
         samples.sort(key=lambda sample: sample.crops.reference.pixels.size)
         starts = range(0, len(samples), size)
         n_rows = len(chosen) / max(1, len(starts))
-        for number, place in enumerate(rng.permutation(len(starts)).tolist()):
+        for number, position in enumerate(rng.permutation(len(starts)).tolist()):
             n_before, n_after = round(number * n_rows), round((number + 1) * n_rows)
-            yield n_after - n_before, samples[starts[place] : starts[place] + size]
+            yield n_after - n_before, samples[starts[position] : starts[position] + size]
 
 
 def _pair(source: Source, row: int, scale_ratio: float, *, rng: np.random.Generator) -> Pair | None:

@@ -33,9 +33,9 @@ class TorchLayers:
     def block(self, name: str, images: torch.Tensor, *, stride: int = 1) -> torch.Tensor:
         """As `network.Operations`."""
         weight = self.tensors[f"{name}.conv.weight"]
-        found = F.conv2d(images, weight, stride=stride, padding=weight.shape[-1] // 2)
-        found = F.batch_norm(
-            found,
+        outputs = F.conv2d(images, weight, stride=stride, padding=weight.shape[-1] // 2)
+        outputs = F.batch_norm(
+            outputs,
             self.tensors[f"{name}.bn.running_mean"],
             self.tensors[f"{name}.bn.running_var"],
             self.tensors[f"{name}.bn.weight"],
@@ -44,7 +44,7 @@ class TorchLayers:
             momentum=BN_MOMENTUM,
             eps=BN_EPSILON,
         )
-        return F.silu(found)
+        return F.silu(outputs)
 
     def upsampled(self, name: str, images: torch.Tensor) -> torch.Tensor:
         """As `network.Operations`."""
@@ -77,7 +77,7 @@ class TorchLayers:
         """As `network.Operations`."""
         return F.linear(values, self.tensors[f"{name}.weight"], self.tensors[f"{name}.bias"])
 
-    def values(self, found: torch.Tensor) -> NDArray[np.float32]:
+    def values(self, array: torch.Tensor) -> NDArray[np.float32]:
         """As `network.Operations`."""
-        numbers: NDArray[np.float32] = found.detach().cpu().numpy()
+        numbers: NDArray[np.float32] = array.detach().cpu().numpy()
         return numbers

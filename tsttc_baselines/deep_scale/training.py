@@ -92,7 +92,7 @@ class Recipe:
 
 @dataclass(frozen=True, slots=True)
 class Epoch:
-    """What an epoch came to: the mean loss of a pair, and the evaluator's scores on the other sequences.
+    """The figures of an epoch: the mean loss of a pair, and the evaluator's scores on the other sequences.
 
     `n_left_out` counts the sequences that nothing was learned from: a frame or a box is missing or too small,
     or the network has no such scale ratio. Number 0 has the scores before epoch 1, and no loss.
@@ -115,8 +115,8 @@ class Validation:
     def scores(self, operations: TorchLayers, *, use: Use) -> dict[str, Any]:
         """The evaluator's report: means by metric, for each TTC range."""
         truth = self.source.truth
-        found = [self._scale_ratio(operations, row, use=use) for row in range(truth.n_sequences)]
-        ttc_s = scale_ratio_to_ttc(found, fps_hz=fps_of_gap(5))
+        scale_ratios = [self._scale_ratio(operations, row, use=use) for row in range(truth.n_sequences)]
+        ttc_s = scale_ratio_to_ttc(scale_ratios, fps_hz=fps_of_gap(5))
         report = evaluate(Predictions.from_arrays(ttc_s=ttc_s, manifest=truth.manifest), truth)
         return {name: score.means for name, score in report.scores.items()}
 
@@ -133,10 +133,10 @@ class Validation:
         frames = pair.reference, pair.target
         with torch.no_grad():
             logits = network_logits(operations, [cut(frames, pair.boxes, use=use)], use=use)
-            found = float(mean_scale_ratio(logits)[0])
+            scale_ratio = float(mean_scale_ratio(logits)[0])
             if use.decoding == "fit":
-                found = fitted_scale_ratio(operations, frames, pair.boxes, near=found)
-        return found
+                scale_ratio = fitted_scale_ratio(operations, frames, pair.boxes, near=scale_ratio)
+        return scale_ratio
 
 
 def mean_scale_ratio(logits: torch.Tensor) -> torch.Tensor:
@@ -247,7 +247,7 @@ class Network:
 
 @contextmanager
 def _one_thread_each() -> Iterator[int]:
-    """What torch does within takes one thread. Gives the number of those that it may take."""
+    """Limit torch to one thread inside; yields the number of threads that it had."""
     n_threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -266,7 +266,7 @@ def _loss(logits: torch.Tensor, scale_ratios: Sequence[float], *, ratio_weight: 
 
 
 def fit_error(operations: TorchLayers, sample: FitSample) -> torch.Tensor:
-    """How far a step of the fit is from what is lacking, in MiD; large errors count less."""
+    """The error of a step of the fit, in MiD; large errors count less."""
     target, reference = (evened(maps) for maps in features(operations, operations.constant(sample.pixels)))
     rows, columns = (operations.constant(offsets) for offsets in sample.grid.offsets())
     design, errors = equations(torch, target, reference, grid=sample.grid, offsets=(rows, columns))
@@ -346,7 +346,7 @@ def _epoch(scores: dict[str, Any], *, number: int, losses: Sequence[float], n_le
 
 
 def card_of(recipe: Recipe, source: Source, epochs: Sequence[Epoch]) -> dict[str, Any]:
-    """What the file of the weights says of its making."""
+    """The training record in the weights' file."""
     return {
         "recipe": {name: value for name, value in asdict(recipe).items() if name != "use"},
         "data": {"sequences": int(source.truth.n_sequences), "digest": source.truth.digest},
@@ -383,7 +383,7 @@ def _begun(
 
 
 def _keep(part: Path, *, key: str, network: Network, epochs: Sequence[Epoch]) -> None:
-    """What goes on after an end; the file appears whole."""
+    """Write the state from which a later run continues; the file appears whole."""
     new = part.with_name(part.name + ".new")
     state = {
         "key": key,

@@ -163,12 +163,12 @@ def _read_card(archive: zipfile.ZipFile) -> dict[str, Any]:
     return card
 
 
-def _read_use(found: object) -> Use:
-    """How the card says that the weights are to be used; raises `Rejected`."""
+def _read_use(entry: object) -> Use:
+    """Read the card's settings for using the weights; raises `Rejected`."""
     # Cards that were written before there was a choice have no decoding.
     known = {each.name for each in fields(Use)}
-    if isinstance(found, dict) and known - {"decoding"} <= found.keys() <= known:
-        use = Use(**found)
+    if isinstance(entry, dict) and known - {"decoding"} <= entry.keys() <= known:
+        use = Use(**entry)
         numbers = (use.n_cells, use.max_box_px, use.margin_px)
         if (
             use.similarity in ("dot", "cosine")
@@ -180,4 +180,4 @@ def _read_use(found: object) -> Use:
             and 0 <= use.margin_px <= 64
         ):
             return use
-    raise reject("bad-weights", f'"use" in {CARD} says nothing that this version can do: {str(found)[:200]}.')
+    raise reject("bad-weights", f'"use" in {CARD} says nothing that this version can do: {str(entry)[:200]}.')

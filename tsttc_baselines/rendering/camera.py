@@ -1,4 +1,4 @@
-"""What a camera does to a scene (defocus, exposure, shading, noise, JPEG), and a detector to a box."""
+"""Effects of a camera on a scene (defocus, exposure, shading, noise, JPEG), and of a detector on a box."""
 
 from __future__ import annotations
 

@@ -234,7 +234,7 @@ class _Canvas:
 
     @property
     def image(self) -> Image:
-        """What has been drawn, in colour."""
+        """The drawn image, in colour."""
         return np.asarray(cv2.cvtColor(self._pixels, cv2.COLOR_BGRA2BGR), dtype=np.uint8)
 
     def _project(self, x_m: Floats, y_m: Floats, depth_m: Floats) -> Floats:
@@ -363,7 +363,7 @@ class _Canvas:
         self._pixels[y1:y2, x1:x2] = cv2.blendLinear(over, under, weight, 1 - weight)
 
     def draw_occluder(self) -> None:
-        """A post between camera and vehicle, half as far, which stands still."""
+        """A post between camera and vehicle, half as far, which does not move."""
         if self._scene.occluder is None:
             return
         scene, vehicle = self._scene, VEHICLES[self._scene.vehicle]

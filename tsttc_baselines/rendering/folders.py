@@ -42,7 +42,7 @@ class Renderer:
 
 
 def image_path(split: Split, row: int, frame: int, *, images: Path) -> Path:
-    """Where a frame lies: `{bag_stamp}/cam{cam_id}/{ts}.jpg`."""
+    """The path of a frame: `{bag_stamp}/cam{cam_id}/{ts}.jpg`."""
     ts_ns = split.table.ts_ns[row] - (N_FRAMES - 1 - frame) * FRAME_STEP_NS
     return images / split.table.bag_stamp[row] / f"cam{split.table.cam_id[row]}" / f"{ts_ns}.jpg"
 

@@ -1,4 +1,4 @@
-"""What surrounds a vehicle: the scenery that stands behind it, and the road."""
+"""The surroundings of a vehicle: the scenery behind it, and the road."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ SUBPIXEL_BITS: Final = 4
 
 @dataclass(slots=True)
 class Texture:
-    """An upright plane, (height, width, 4), and its place in metres beside and above the vehicle's foot."""
+    """An upright plane, (height, width, 4), placed in metres right of and above the vehicle's foot."""
 
     pixels: Image
     left_m: float

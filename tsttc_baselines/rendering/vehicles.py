@@ -109,7 +109,7 @@ class _Drawing:
         self.pixels = as_image(cv2.addWeighted(uneven_pixels, 1, light, 1, -128))
 
     def texture(self) -> Texture:
-        """What has been drawn so far."""
+        """The image drawn so far."""
         return Texture(
             pixels=self.pixels.copy(),
             left_m=self.left_m,

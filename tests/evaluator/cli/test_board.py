@@ -90,7 +90,7 @@ def test_person_who_watches_hears_of_a_silent_address_at_once(
 
     monkeypatch.setattr(sys, "stderr", Screen())
     with connect("http://127.0.0.1:9", with_token=False) as client:
-        assert client.patience.n_first_tries == n_tries
+        assert client.retry_policy.n_first_tries == n_tries
 
 
 @pytest.mark.parametrize(

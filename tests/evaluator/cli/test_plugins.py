@@ -19,9 +19,9 @@ def hello():
 
 @pytest.fixture(autouse=True)
 def _empty_cache() -> Iterator[None]:
-    plugins.found.cache_clear()
+    plugins.commands.cache_clear()
     yield
-    plugins.found.cache_clear()
+    plugins.commands.cache_clear()
 
 
 @pytest.fixture

@@ -91,9 +91,9 @@ def test_files_are_compared_offline_as_the_library_does(
     assert document["differences"]["mid"]["low"] == expected["mid"].low
     assert document["first"]["scores"]["overall"]["mid"] < document["second"]["scores"]["overall"]["mid"]
     text = tsttc(*arguments).stdout
-    assert sentence(str(files[0]), str(files[1]), name="mid", found=expected["mid"]) in text
+    assert sentence(str(files[0]), str(files[1]), name="mid", difference=expected["mid"]) in text
     assert "9 of the 9 other metrics differ significantly" in text
-    assert influence(str(files[0]), str(files[1]), found=expected["mid"]) in text.splitlines()
+    assert influence(str(files[0]), str(files[1]), difference=expected["mid"]) in text.splitlines()
     assert site.requests == []
     bad = tsttc("compare", EXAMPLES / "broken.json", files[0], "--truth", truth_of_30_recordings)
     assert bad.exit_code == 1

@@ -121,7 +121,7 @@ def test_answer_of_another_shape_is_named(
     site.put(ONE, Reply(body))
     with pytest.raises(BadAnswer) as caught:
         client.submission("abc")
-    assert caught.value.found == shape
+    assert caught.value.content == shape
 
 
 def test_redirect_is_reported_and_not_followed(client: Client, site: RecordedSite) -> None:

@@ -85,7 +85,7 @@ def test_state_of_a_newer_server_is_not_taken_for_a_final_one(client: Client, si
 def test_server_that_has_answered_is_waited_for_when_it_goes_away(clock: FakeTime) -> None:
     with RecordedSite() as site:
         site.put("GET /api/v1/quota", Reply([], headers={"Connection": "close"}))
-        client = Client(url=site.url, sleep=clock.sleep, patience=RetryPolicy(n_tries=5))
+        client = Client(url=site.url, sleep=clock.sleep, retry_policy=RetryPolicy(n_tries=5))
         assert client.quota() == []
     with client, pytest.raises(Unreachable):
         client.quota()

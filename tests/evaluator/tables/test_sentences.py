@@ -11,7 +11,7 @@ FAR = Difference(-4.1, -5.3, -2.9, 0.0003)
 
 
 def sentence_of(difference: Difference, *, name: str = "mid", decimals: int = 2) -> str:
-    return sentence("A", "B", name=name, found=difference, decimals=decimals)
+    return sentence("A", "B", name=name, difference=difference, decimals=decimals)
 
 
 @pytest.mark.parametrize(

@@ -310,6 +310,6 @@ def test_a_lie_about_annotations_is_refused_in_words(
 def test_reader_that_complains_without_end_is_ended(
     read_folder: Callable[[bytes], Manifest], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(annotation_folders, "_PATIENCE_S", 0.1)
+    monkeypatch.setattr(annotation_folders, "_EXIT_TIMEOUT_S", 0.1)
     with pytest.raises(Rejected, match="Reading the file"):
         read_folder(MARK + b"os.close(1)\nwhile True: os.write(2, bytes(1 << 16))")
