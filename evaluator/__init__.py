@@ -19,10 +19,11 @@ if TYPE_CHECKING:
     from evaluator.predictions.writing import write_predictions
     from evaluator.problems import PROBLEM_CODES, Problem, Rejected
     from evaluator.scoring.differences import compare_predictions
-    from evaluator.scoring.report import RangeScore, Report, format_rounded, rounded
+    from evaluator.scoring.intervals import confidence_intervals
+    from evaluator.scoring.report import Report
+    from evaluator.scoring.results import RangeScore, format_rounded, rounded
     from evaluator.scoring.scores import evaluate
     from evaluator.scoring.significance import Difference
-    from evaluator.scoring.uncertainty import confidence_intervals
     from evaluator.truth.csv_tables import Table
     from evaluator.truth.ground_truth import GroundTruth, Manifest, read_manifest, read_truth
     from evaluator.truth.numbering import read_numbering
@@ -38,11 +39,12 @@ else:
         "predictions.loading": ("Predictions", "read_predictions"),
         "problems": ("PROBLEM_CODES", "Problem", "Rejected"),
         "metrics.protocol": ("TTC_RANGES", "PROTOCOLS", "SCORE_NAMES", "Protocol", "get_protocol"),
-        "scoring.report": ("RangeScore", "Report", "format_rounded", "rounded"),
+        "scoring.report": ("Report",),
+        "scoring.results": ("RangeScore", "format_rounded", "rounded"),
         "scoring.scores": ("evaluate",),
         "scoring.significance": ("Difference",),
         "truth.ground_truth": ("GroundTruth", "Manifest", "read_manifest", "read_truth"),
-        "scoring.uncertainty": ("confidence_intervals",),
+        "scoring.intervals": ("confidence_intervals",),
         "predictions.writing": ("write_predictions",),
     }
     _HOME_OF = {name: f"evaluator.{module}" for module, names in _HOMES.items() for name in names}

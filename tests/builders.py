@@ -13,6 +13,7 @@ from django.utils import timezone
 import evaluator
 from leaderboard import board_versions
 from leaderboard.editions import ground_truth
+from leaderboard.methods import editing
 from leaderboard.methods import visibility as visibility_verbs
 from leaderboard.models import Edition, PublishedResult, QuotaOverride, Split, Submission, Team, User
 from leaderboard.people import tokens
@@ -60,15 +61,17 @@ def send(
     **fields: str,
 ) -> intake.Submitted:
     """What sending a file is answered, as the web form sends it."""
-    return intake.submit(
+    request = intake.SubmissionRequest(
         user=user,
         split_name=split,
         method_name=method,
         upload=ContentFile(data, name="predictions.json") if isinstance(data, bytes) else data,
         via=Submission.Via.WEB,
         now=now or timezone.now(),
+        details={name: fields.pop(name) for name in editing.FIELDS if name in fields},
         **{"filename": "predictions.json", **fields},
     )
+    return intake.submit(request)
 
 
 def submit(user: User, data: bytes, *, visibility: str = "PUBLIC", **options: Any) -> Submission:

@@ -177,7 +177,7 @@ def _marks_of(board: Board, name: str) -> tuple[frozenset[int], frozenset[int]]:
 
 def _interval_text(entry: BoardEntry, name: str) -> str:
     """The confidence interval to append to a value; empty if unknown."""
-    from evaluator.scoring.report import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
+    from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     interval = entry.interval(name)
     low, high = (

@@ -167,7 +167,7 @@ def table(
     decimals: int = 2,
 ) -> list[str]:
     """Both results, and below them the difference of each column with its interval and p."""
-    from evaluator.scoring.report import format_rounded, rounded  # noqa: PLC0415 -- loads numpy
+    from evaluator.scoring.results import format_rounded, rounded  # noqa: PLC0415 -- loads numpy
 
     columns = list(scores[0])
     rows = [[Cell(""), *(Cell(short_name(name), is_bold=True) for name in columns)]]

@@ -130,7 +130,7 @@ def score_table(
     intervals: Mapping[str, tuple[float, float] | None] | None = None,
 ) -> list[str]:
     """One result, below each value the ends of its interval and the number of sequences behind it."""
-    from evaluator.scoring.report import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
+    from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     behind = [counts.get(split_name(name)[1]) for name in scores]
     rows = [

@@ -117,7 +117,7 @@ def list_submissions(*, split: str | None, method: str | None, limit: int, url: 
 
 
 def _table(submissions: Sequence[Submission]) -> list[str]:
-    from evaluator.scoring.report import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
+    from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     heads = ("id", "submitted", "split", "method", "state", short_name(PRIMARY))
     table = [[Cell(text, is_bold=True) for text in heads]]

@@ -208,8 +208,9 @@ def plot(
     names = [Path(one.name).stem for one in scored_files]
     if len(set(names)) < len(names):
         names = [one.name for one in scored_files]
+    details = [one.report.require_details() for one in scored_files]
     try:
-        plots.draw(kind, dict(zip(names, (one.report for one in scored_files), strict=True)), path=output)
+        plots.draw(kind, dict(zip(names, details, strict=True)), path=output)
     except OSError as error:
         raise click.BadParameter(f"{output} cannot be written: {error.strerror}.", param_hint="-o") from None
     if as_json:
@@ -257,12 +258,11 @@ def _rows(scored: _Scored, *, by: str | None, taken: Units | None) -> Iterator[R
                 scored.name, one.group, one.n_sequences, one.n_recordings, one.scores, ends, drawn
             )
         return
-    assert report.details is not None  # noqa: S101 -- it was asked for
     yield ResultRow(
         scored.name,
         None,
         report.n_sequences,
-        report.details.truth.manifest.n_recordings,
+        report.require_details().truth.manifest.n_recordings,
         report.flat(),
         _intervals(report, taken) if taken else {},
         drawn,
@@ -272,8 +272,7 @@ def _rows(scored: _Scored, *, by: str | None, taken: Units | None) -> Iterator[R
 def _intervals(report: Report, taken: Units) -> dict[str, tuple[float, float] | None]:
     from evaluator import confidence_intervals  # noqa: PLC0415 -- numpy, as above
 
-    assert report.details is not None  # noqa: S101 -- it was asked for
-    details = report.details
+    details = report.require_details()
     return confidence_intervals(
         details.predictions, details.truth, protocol=details.protocol, unit=taken.kind
     )

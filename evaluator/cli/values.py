@@ -30,7 +30,7 @@ def overall_of(names: Iterable[str]) -> list[str]:
 
 def texts_of(entry: BoardEntry, *, missing: str, scores: Sequence[str]) -> list[str]:
     """A submission's scores as its edition publishes them, a published row's as they were printed."""
-    from evaluator.scoring.report import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
+    from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     decimals = entry.decimals
     return [format_rounded(entry.scores.get(name), decimals=decimals, missing=missing) for name in scores]
@@ -75,7 +75,7 @@ def in_short(submission: Submission) -> Iterator[str]:
 def _interval_text(
     label: str, value: float | None, interval: ConfidenceInterval | None, *, decimals: int
 ) -> str:
-    from evaluator.scoring.report import format_rounded  # noqa: PLC0415 -- as above
+    from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- as above
 
     if value is None or interval is None or interval.low is None or interval.high is None:
         return ""

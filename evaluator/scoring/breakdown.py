@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.metrics.protocol import OVERALL, Protocol, score_name
+from evaluator.metrics.protocol import OVERALL, score_name
 from evaluator.metrics.scale import Floats
+from evaluator.scoring.results import Details, GroupScores
+from evaluator.scoring.uncertainty import bootstrap_of, by_units
 from evaluator.truth.ground_truth import GroundTruth
-
-if TYPE_CHECKING:
-    from evaluator.predictions.loading import Predictions
 
 CURVE_EDGES_S: Final = (
     -20,
@@ -51,37 +49,8 @@ Rows = NDArray[np.intp]
 Ends = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Details:
-    """What a report was computed from; of a hidden split it never leaves the worker.
-
-    `predicted_ttc_s` is (n,), truncated by the protocol, in the truth's order.
-    """
-
-    truth: GroundTruth
-    predictions: Predictions
-    predicted_ttc_s: Floats
-    protocol: Protocol
-
-
-@dataclass(frozen=True, slots=True)
-class GroupScores:
-    """The scores of one group by their names: None where it has no sequence of a TTC range.
-
-    `intervals` are the 95 % confidence intervals; None where there are too few days or recordings, or none
-    were asked for.
-    """
-
-    group: str
-    n_sequences: int
-    n_recordings: int
-    scores: Mapping[str, float | None]
-    intervals: Mapping[str, Ends | None]
-
-
 def scores_of(
     details: Details,
-    errors: Mapping[str, Floats],
     *,
     groups: Mapping[str, Rows],
     has_ranges: bool = True,
@@ -89,12 +58,12 @@ def scores_of(
     unit: str | None = None,
 ) -> list[GroupScores]:
     """The scores of groups of sequences, given as the rows of each by its name."""
-    manifest, ttc_s = details.truth.manifest, details.truth.ttc_s
+    manifest, ttc_s, errors = details.truth.manifest, details.truth.ttc_s, details.errors
     masks = {OVERALL: np.ones(len(ttc_s), dtype=bool)}
     for ttc_range in details.protocol.ranges if has_ranges else ():
         masks[ttc_range.name] = (ttc_s >= ttc_range.low_s) & (ttc_s <= ttc_range.high_s)
     names = [score_name(metric, name) for metric in errors for name in masks]
-    found = []
+    group_means = []
     sums, counts = list[Floats](), list[Floats]()
     for group, rows in groups.items():
         parts = {name: rows[mask[rows]] for name, mask in masks.items()}
@@ -103,7 +72,7 @@ def scores_of(
             for metric, values in errors.items()
             for name, part in parts.items()
         }
-        found.append((group, rows, means))
+        group_means.append((group, rows, means))
         if with_intervals:
             for values in errors.values():
                 for part in parts.values():
@@ -119,7 +88,7 @@ def scores_of(
             means,
             dict(zip(names, ends[number * len(names) :], strict=False)) or dict.fromkeys(names),
         )
-        for number, (group, rows, means) in enumerate(found)
+        for number, (group, rows, means) in enumerate(group_means)
     ]
 
 
@@ -129,8 +98,6 @@ def _intervals(
     """The interval of each column, all by the same weights."""
     if not sums:
         return []
-    from evaluator.scoring.uncertainty import bootstrap_of, by_units  # noqa: PLC0415 -- a circle
-
     units = truth.manifest.units_by(unit)
     columns, rows = (by_units(np.stack(each, axis=1), units) for each in (counts, sums))
     low, high = bootstrap_of(truth.digest, columns).intervals(rows[None])
@@ -154,25 +121,25 @@ def curve_of(details: Details) -> dict[Ends, Rows]:
     """The rows of every bin [low, high) of true times that has some, by its ends in seconds."""
     bins = np.digitize(details.truth.ttc_s, CURVE_EDGES_S)
     ends = itertools.pairwise(CURVE_EDGES_S)
-    found = {pair: np.flatnonzero(bins == number) for number, pair in enumerate(ends, 1)}
-    return {pair: rows for pair, rows in found.items() if len(rows)}
+    rows_of_bin = {pair: np.flatnonzero(bins == number) for number, pair in enumerate(ends, 1)}
+    return {pair: rows for pair, rows in rows_of_bin.items() if len(rows)}
 
 
 def _by_name(names: Sequence[str]) -> dict[str, Rows]:
-    found, index = np.unique(np.array(names), return_inverse=True)
+    groups, index = np.unique(np.array(names), return_inverse=True)
     order = np.argsort(index, kind="stable")
     ends = np.cumsum(np.bincount(index))[:-1]
-    return dict(zip(found.tolist(), np.split(order, ends), strict=True))
+    return dict(zip(groups.tolist(), np.split(order, ends), strict=True))
 
 
 def _by_range(details: Details) -> dict[str, Rows]:
     ttc_s, left = details.truth.ttc_s, np.ones(details.truth.n_sequences, dtype=bool)
-    found = {}
+    groups = {}
     for ttc_range in details.protocol.ranges:
         inside = (ttc_s >= ttc_range.low_s) & (ttc_s <= ttc_range.high_s)  # both ends, as in the scores
-        found[f"{ttc_range.name} {ttc_range.seconds}"] = np.flatnonzero(inside)
+        groups[f"{ttc_range.name} {ttc_range.seconds}"] = np.flatnonzero(inside)
         left &= ~inside
-    return found | {"in no range": np.flatnonzero(left)}
+    return groups | {"in no range": np.flatnonzero(left)}
 
 
 def _by_occlusion(details: Details) -> dict[str, Rows]:

@@ -49,10 +49,10 @@ def dependence(
     if not square or not pairs[0]:
         return None
     scale = square / float((counts**2).sum())
-    found = np.divide(products, pairs, out=np.zeros_like(pairs), where=pairs > 0) / scale
-    n_as_large = int((found[1:] >= found[0]).sum())
+    correlations = np.divide(products, pairs, out=np.zeros_like(pairs), where=pairs > 0) / scale
+    n_as_large = int((correlations[1:] >= correlations[0]).sum())
     return Dependence(
         se_factor=float(np.sqrt((totals[:, 0] ** 2).sum() / square)),
-        correlation=float(found[0]),
+        correlation=float(correlations[0]),
         p=(1 + n_as_large) / (n + 1),
     )

@@ -16,7 +16,7 @@ import numpy as np
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PRIMARY, Protocol, get_protocol
 from evaluator.metrics.scale import Floats
 from evaluator.predictions.loading import Predictions
-from evaluator.scoring.report import rounded
+from evaluator.scoring.results import rounded
 from evaluator.scoring.scores import Scorer
 from evaluator.scoring.significance import SIGNIFICANT, Difference, Influence, cut_off, p_below
 from evaluator.scoring.uncertainty import by_units, degrees_of, generator_of, usable_columns
@@ -131,15 +131,15 @@ def difference(
     they are. A column without sequences is absent.
     """
     gaps, n, degrees = first - second, counts.sum(axis=0), degrees_of(counts)
-    found = sign_flips(gaps, counts, rng=signs, n_flips=n_flips)
+    flips = sign_flips(gaps, counts, rng=signs, n_flips=n_flips)
     # With 8 degrees of freedom there are 8 units, and an end is missing after a few dozen flips alone.
-    is_known = usable_columns(counts) & np.isfinite(found.low) & np.isfinite(found.high)
+    is_known = usable_columns(counts) & np.isfinite(flips.low) & np.isfinite(flips.high)
     return {
         name: Difference(
             float(gaps[:, i].sum() / n[i]),
-            low=float(found.low[i]) if is_known[i] else None,
-            high=float(found.high[i]) if is_known[i] else None,
-            p=float(found.p[i]) if is_known[i] else None,
+            low=float(flips.low[i]) if is_known[i] else None,
+            high=float(flips.high[i]) if is_known[i] else None,
+            p=float(flips.p[i]) if is_known[i] else None,
             n_effective=float(degrees[i]),
             unit=unit,
         )
@@ -182,23 +182,23 @@ def influence(
 
 
 def with_influence(
-    found: Mapping[str, Difference],
+    compared: Mapping[str, Difference],
     *,
     differences: Floats,
     counts: Floats,
     names: Sequence[str],
     rng: np.random.Generator,
 ) -> dict[str, Difference]:
-    """Add to `found` on how few units the difference in overall MiD rests, where there are enough for a p.
+    """Add to `compared` on how few units the difference in overall MiD rests, where there are enough for a p.
 
     `differences` and `counts` are (units, columns), `names` those of the columns.
     """
-    overall = found.get(PRIMARY)
+    overall = compared.get(PRIMARY)
     if overall is None or overall.p_below is None:
-        return dict(found)
+        return dict(compared)
     column = list(names).index(PRIMARY)
     rests_on = influence(differences[:, column], counts[:, column], rng=rng)
-    return {**found, PRIMARY: replace(overall, influence=rests_on)}
+    return {**compared, PRIMARY: replace(overall, influence=rests_on)}
 
 
 def _first_false(holds: Callable[[int], bool], last: int) -> int:
@@ -215,7 +215,7 @@ def _first_false(holds: Callable[[int], bool], last: int) -> int:
 
 
 def rounded_difference(
-    found: Difference, *, first: float | None, second: float | None, decimals: int
+    exact: Difference, *, first: float | None, second: float | None, decimals: int
 ) -> Difference:
     """A difference as it is published, by the two values that it is between; these may be rounded already.
 
@@ -234,23 +234,23 @@ def rounded_difference(
     Difference(difference=0.0, low=0.0, high=0.01, p=1.0, p_below=1.0, n_effective=None)
     """
     if first is None or second is None:
-        shown = _rounded(found.difference, decimals)
+        shown = _rounded(exact.difference, decimals)
     else:
         shown = _rounded(_rounded(first, decimals) - _rounded(second, decimals), decimals)
-    if found.n_effective is not None:
-        found = replace(found, n_effective=cut_off(found.n_effective))
-    if found.low is None or found.high is None or found.p_below is None:
-        return replace(found, difference=shown)
-    low, high = _rounded(found.low, decimals), _rounded(found.high, decimals)
+    if exact.n_effective is not None:
+        exact = replace(exact, n_effective=cut_off(exact.n_effective))
+    if exact.low is None or exact.high is None or exact.p_below is None:
+        return replace(exact, difference=shown)
+    low, high = _rounded(exact.low, decimals), _rounded(exact.high, decimals)
     if shown == 0:
         return replace(
-            found, difference=shown, low=min(low, 0.0), high=max(high, 0.0), p=1.0, p_below=p_below(1.0)
+            exact, difference=shown, low=min(low, 0.0), high=max(high, 0.0), p=1.0, p_below=p_below(1.0)
         )
-    if found.is_significant:
+    if exact.is_significant:
         unit = _rounded(10.0**-decimals, decimals)
-        low, high = (max(low, unit), high) if found.difference > 0 else (low, min(high, -unit))
-    p = None if found.p is None else _rounded(found.p, P_DECIMALS)
-    return replace(found, difference=shown, low=min(low, shown), high=max(high, shown), p=p)
+        low, high = (max(low, unit), high) if exact.difference > 0 else (low, min(high, -unit))
+    p = None if exact.p is None else _rounded(exact.p, P_DECIMALS)
+    return replace(exact, difference=shown, low=min(low, shown), high=max(high, shown), p=p)
 
 
 def _rounded(value: float, decimals: int) -> float:
@@ -272,7 +272,7 @@ def compare_predictions(
     """Compare two sets of predictions of the same sequences: first minus second under each score name.
 
     The random numbers belong to the ground truth's revision, so these are the numbers of an open board's own
-    comparison, rounded as there to so many `decimals` (None: not at all). `unit` is as in
+    comparison, rounded as there to `decimals` (None: not at all). `unit` is as in
     `confidence_intervals`. A column without sequences is absent. Raises as `evaluator.evaluate` does.
     """
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
@@ -283,7 +283,7 @@ def compare_predictions(
     sums, other_sums, counts = (
         by_units(each, units) for each in (one.bags.sums, other.bags.sums, one.bags.counts)
     )
-    found = difference(
+    compared = difference(
         sums,
         other_sums,
         counts,
@@ -292,17 +292,17 @@ def compare_predictions(
         n_flips=n_flips,
         unit=units.kind,
     )
-    found = with_influence(
-        found,
+    compared = with_influence(
+        compared,
         differences=sums - other_sums,
         counts=counts,
         names=rules.score_names,
         rng=generator_of(truth.digest, purpose="influence"),
     )
     if decimals is None:
-        return found
+        return compared
     values = one.flat(), other.flat()
     return {
         name: rounded_difference(gap, first=values[0][name], second=values[1][name], decimals=decimals)
-        for name, gap in found.items()
+        for name, gap in compared.items()
     }

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib import rc_context
@@ -16,9 +16,7 @@ from matplotlib.figure import Figure
 from evaluator.metrics.protocol import metric_of
 from evaluator.metrics.registry import Metric
 from evaluator.scoring.breakdown import curve_of, scores_of
-
-if TYPE_CHECKING:
-    from evaluator.scoring.report import Report
+from evaluator.scoring.results import Details
 
 SUFFIXES: Final = (".svg", ".pdf", ".png")
 # Told apart without colour vision (Okabe and Ito), and by their dashes in print.
@@ -38,10 +36,10 @@ SETTINGS: Final[dict[str, Any]] = {
 }
 
 
-def draw(kind: str, reports: Mapping[str, Report], *, path: str | Path | None = None) -> Figure:
-    """Draw `kind`, one of `KINDS`, of reports by the names that the legend shows.
+def draw(kind: str, scored: Mapping[str, Details], *, path: str | Path | None = None) -> Figure:
+    """Draw `kind`, one of `KINDS`, of what was scored, by the names that the legend shows.
 
-    Raises `ValueError` for another kind, another ending of `path`, and a report without sequences.
+    Raises `ValueError` for another kind and another ending of `path`.
     """
     if kind not in KINDS:
         raise ValueError(f"Unknown kind {kind!r}; expected one of {', '.join(KINDS)}.")
@@ -51,7 +49,7 @@ def draw(kind: str, reports: Mapping[str, Report], *, path: str | Path | None = 
         )
     with rc_context(SETTINGS):
         figure = Figure(figsize=(6.4, 3.6), layout="constrained")
-        KINDS[kind](figure, reports)
+        KINDS[kind](figure, scored)
         if path is not None:
             # Without the date the same figure is the same file.
             dated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
@@ -59,20 +57,19 @@ def draw(kind: str, reports: Mapping[str, Report], *, path: str | Path | None = 
     return figure
 
 
-def _error(figure: Figure, reports: Mapping[str, Report]) -> None:
+def _error(figure: Figure, scored: Mapping[str, Details]) -> None:
     """Mean errors over bins of the true time, each with its 95 % confidence interval where there is one."""
-    metrics = [metric_of(name) for name in next(iter(reports.values())).scores["overall"].means]
+    metrics = [metric_of(name) for name in next(iter(scored.values())).errors]
     axes = figure.subplots(1, len(metrics), squeeze=False)[0]
-    for number, (name, report) in enumerate(reports.items()):
-        errors, details = report._kept()
+    for number, (name, details) in enumerate(scored.items()):
         curve = curve_of(details)
         groups = {f"{low}": rows for (low, _), rows in curve.items()}
-        found = scores_of(details, errors, groups=groups, has_ranges=False, with_intervals=True)
+        bins = scores_of(details, groups=groups, has_ranges=False, with_intervals=True)
         middles = np.array([(low + high) / 2 for low, high in curve])
         for axis, metric in zip(axes, metrics, strict=True):
             style = {"color": COLOURS[number % len(COLOURS)], "linestyle": DASHES[number % len(DASHES)]}
-            means = np.array([row.scores[metric.name] for row in found], dtype=float)
-            ends = np.array([row.intervals[metric.name] or (np.nan, np.nan) for row in found])
+            means = np.array([row.scores[metric.name] for row in bins], dtype=float)
+            ends = np.array([row.intervals[metric.name] or (np.nan, np.nan) for row in bins])
             # No line leads over 0, where nothing is approached or left.
             for side in (middles < 0, middles > 0):
                 label = name if side[-1] else None
@@ -80,14 +77,13 @@ def _error(figure: Figure, reports: Mapping[str, Report]) -> None:
                 axis.fill_between(middles[side], *ends[side].T, color=style["color"], alpha=0.2, linewidth=0)
     for axis, metric in zip(axes, metrics, strict=True):
         axis.set(xlabel="true TTC (s)", ylabel=f"{_heading(metric)}, mean", yscale="log")
-    _legend(figure, axes[0], reports)
+    _legend(figure, axes[0], scored)
 
 
-def _scatter(figure: Figure, reports: Mapping[str, Report]) -> None:
+def _scatter(figure: Figure, scored: Mapping[str, Details]) -> None:
     """Predicted against true seconds, a panel for each report; at most 5,000 points, drawn at random."""
-    panels = figure.subplots(1, len(reports), squeeze=False, sharex=True, sharey=True)[0]
-    for number, (axis, (name, report)) in enumerate(zip(panels, reports.items(), strict=True)):
-        _, details = report._kept()
+    panels = figure.subplots(1, len(scored), squeeze=False, sharex=True, sharey=True)[0]
+    for number, (axis, (name, details)) in enumerate(zip(panels, scored.items(), strict=True)):
         drawn = np.random.default_rng(0).permutation(details.truth.n_sequences)[:MAX_POINTS]
         axis.plot(
             details.truth.ttc_s[drawn],
@@ -106,14 +102,13 @@ def _scatter(figure: Figure, reports: Mapping[str, Report]) -> None:
     panels[0].set_ylabel("predicted TTC (s)")
 
 
-def _distribution(figure: Figure, reports: Mapping[str, Report]) -> None:
+def _distribution(figure: Figure, scored: Mapping[str, Details]) -> None:
     """The share of sequences whose error is at most so large."""
-    metrics = [metric_of(name) for name in next(iter(reports.values())).scores["overall"].means]
+    metrics = [metric_of(name) for name in next(iter(scored.values())).errors]
     axes = figure.subplots(1, len(metrics), squeeze=False, sharey=True)[0]
-    for number, (name, report) in enumerate(reports.items()):
-        errors, _ = report._kept()
+    for number, (name, details) in enumerate(scored.items()):
         for axis, metric in zip(axes, metrics, strict=True):
-            values = np.sort(errors[metric.name])
+            values = np.sort(details.errors[metric.name])
             shares = 100 * np.arange(1, len(values) + 1) / len(values)
             style = {"color": COLOURS[number % len(COLOURS)], "linestyle": DASHES[number % len(DASHES)]}
             axis.step(values, shares, where="post", label=name, **style)
@@ -121,7 +116,7 @@ def _distribution(figure: Figure, reports: Mapping[str, Report]) -> None:
                 xlabel=f"{_heading(metric)} of a sequence", xscale="log", xlim=(0.1, None), ylim=(0, 100)
             )
     axes[0].set_ylabel("sequences (%)")
-    _legend(figure, axes[0], reports)
+    _legend(figure, axes[0], scored)
 
 
 def _heading(metric: Metric) -> str:
@@ -129,14 +124,14 @@ def _heading(metric: Metric) -> str:
     return f"{metric.symbol} {unit}".rstrip()
 
 
-def _legend(figure: Figure, axis: Any, reports: Mapping[str, Report]) -> None:
+def _legend(figure: Figure, axis: Any, scored: Mapping[str, Details]) -> None:
     """Above the panels, where it covers no curve."""
-    if len(reports) > 1:
+    if len(scored) > 1:
         handles, names = axis.get_legend_handles_labels()
         figure.legend(handles, names, loc="outside upper center", ncols=len(names), frameon=False)
 
 
-KINDS: Final[dict[str, Callable[[Figure, Mapping[str, Report]], None]]] = {
+KINDS: Final[dict[str, Callable[[Figure, Mapping[str, Details]], None]]] = {
     "error": _error,
     "scatter": _scatter,
     "distribution": _distribution,

@@ -97,7 +97,7 @@ def rank_ranges(
         present = np.flatnonzero(np.isfinite(published[:, column]))
         if present.size:
             rows = _rows(sums[present, :, column], published[present, column], quoted, column)
-            n_better, n_worse = _told_apart(rows, signs, between)
+            n_better, n_worse = _count_significant(rows, signs, between)
             low[present, column] = 1 + n_better[: len(present)]
             n_rows = np.count_nonzero(rows.kind != _LOWER_END)
             high[present, column] = n_rows - n_worse[: len(present)]
@@ -155,8 +155,8 @@ def _exact(sums: Floats) -> Floats:
     return np.asarray(np.ldexp(np.rint(np.ldexp(sums, _DIGITS - exponents)), exponents - _DIGITS))
 
 
-def _told_apart(rows: _Rows, signs: Floats, between: Callable[[], None]) -> tuple[Integers, Integers]:
-    """Of every row, how many are significantly better, and how many worse: step-down over all pairs."""
+def _count_significant(rows: _Rows, signs: Floats, between: Callable[[], None]) -> tuple[Integers, Integers]:
+    """Count for every row how many are significantly better, and how many worse: step-down over all pairs."""
     blocks = []
     for start in range(0, len(rows.values), _ROWS):
         between()
@@ -206,14 +206,14 @@ def _measured(rows: _Rows, start: int) -> _Pairs:
 
 def _largest_up_to(turned: Weights, pairs: _Pairs, between: Callable[[], None]) -> Weights:
     """In every draw the largest rise over the first 0, 1, 2, … blocks, and over all opposites."""
-    found = [np.zeros(turned.shape[1], dtype=np.float32)]
-    opposite = found[0]
+    rises = [np.zeros(turned.shape[1], dtype=np.float32)]
+    opposite = rises[0]
     for start in range(0, len(pairs.t), _BLOCK):
         between()
         rise, fall = _largest(turned, pairs.of(slice(start, start + _BLOCK)))
-        found.append(np.maximum(found[-1], rise))
+        rises.append(np.maximum(rises[-1], rise))
         opposite = np.maximum(opposite, fall)
-    return np.maximum(np.stack(found), opposite)
+    return np.maximum(np.stack(rises), opposite)
 
 
 def _largest(turned: Weights, pairs: _Pairs) -> tuple[Weights, Weights]:

@@ -1,9 +1,8 @@
-"""The result of one evaluation, and the one way in which a number is rounded."""
+"""The report on one set of predictions."""
 
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from html import escape
@@ -12,7 +11,8 @@ from typing import TYPE_CHECKING
 from evaluator.counting import counted
 from evaluator.metrics.protocol import OVERALL, metric_of, range_of, score_name
 from evaluator.metrics.scale import Floats
-from evaluator.scoring.breakdown import Details, GroupScores, groups_of, scores_of
+from evaluator.scoring.breakdown import groups_of, scores_of
+from evaluator.scoring.results import Details, GroupScores, RangeScore, RecordingSums, format_rounded
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,42 +22,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class RangeScore:
-    """Mean errors over one TTC range, by metric. One without sequences has no value: None, never 0."""
-
-    means: Mapping[str, float | None]
-    count: int
-
-    @property
-    def mid(self) -> float | None:
-        """The mean motion-in-depth error."""
-        return self.means["mid"]
-
-    @property
-    def rte(self) -> float | None:
-        """The mean relative TTC error."""
-        return self.means["rte"]
-
-    def as_dict(self) -> dict[str, float | int | None]:
-        """The score as plain data. Written out: `dataclasses.asdict` copies for longer than scoring takes."""
-        return {**self.means, "count": self.count}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RecordingSums:
-    """Sums of errors per recording ("bag"), and how many sequences each sum has.
-
-    Both are float64 (G, columns): the recordings as in `Manifest.recordings`, the columns as in the
-    protocol's `score_names`. For a hidden split they never leave the worker.
-    """
-
-    sums: Floats
-    counts: Floats
-
-
-@dataclass(frozen=True, slots=True)
 class Report:
-    """What the predictions scored: means per TTC range, counts, and what was truncated at which boundary.
+    """Means per TTC range, counts, and the number of predictions that were truncated to each boundary.
 
     `scores` runs as the protocol's `range_names`: overall, crucial, …. Only on request, and no part of the
     JSON: `sequences`, by metric the errors of every sequence, float64 (n,) in the manifest's order, `details`
@@ -121,10 +87,9 @@ class Report:
         `unit` is as in `confidence_intervals`. Raises `ValueError` for another `by`, a ground truth without
         what the groups need, and a report without sequences.
         """
-        errors, details = self._kept()
+        details = self.require_details()
         return scores_of(
             details,
-            errors,
             groups=groups_of(details, by=by),
             # A group that is a TTC range is not cut into ranges once more.
             has_ranges=by != "range",
@@ -157,7 +122,7 @@ class Report:
         What the annotations say of the object is added where they say it. Raises `ValueError` for a report
         without sequences.
         """
-        errors, details = self._kept()
+        details = self.require_details()
         table = details.truth.to_table()
         objects = dict[str, list[object]](occ_ratio=list(table.occ_ratio), same_lane=list(table.same_lane))
         box_height = details.truth.objects.box_height
@@ -169,7 +134,7 @@ class Report:
             "track_id": list(table.track_id),
             "ttc_s": list(table.ttc_s),
             "predicted_ttc_s": details.predicted_ttc_s.tolist(),
-            **{name: values.tolist() for name, values in errors.items()},
+            **{name: values.tolist() for name, values in details.errors.items()},
             **{name: values for name, values in objects.items() if values},
             **({} if box_height is None else {"box_height": box_height.tolist()}),
         }
@@ -190,14 +155,16 @@ class Report:
         """
         from evaluator.scoring import plots  # noqa: PLC0415 -- matplotlib is of an extra
 
-        return plots.draw(kind, {name or "predictions": self, **others}, path=path)
+        reports = {name or "predictions": self, **others}
+        return plots.draw(kind, {key: report.require_details() for key, report in reports.items()}, path=path)
 
-    def _kept(self) -> tuple[Mapping[str, Floats], Details]:
-        if self.sequences is None or self.details is None:
+    def require_details(self) -> Details:
+        """The details, or a `ValueError` that says how to get them."""
+        if self.details is None:
             raise ValueError(
                 "The report has no errors of single sequences; call evaluate(…, keep_sequences=True)."
             )
-        return self.sequences, self.details
+        return self.details
 
     def as_dict(self) -> dict[str, object]:
         """The report as plain data, in the shape of `tsttc score --json`."""
@@ -225,32 +192,9 @@ class Report:
 
 
 def _with_ends(row: GroupScores, *, with_intervals: bool) -> dict[str, float | None]:
-    found: dict[str, float | None] = {}
+    columns: dict[str, float | None] = {}
     for name, value in row.scores.items():
-        found[name] = value
+        columns[name] = value
         if with_intervals:
-            found[f"{name}_low"], found[f"{name}_high"] = row.intervals[name] or (None, None)
-    return found
-
-
-def rounded(value: float | None, *, decimals: int = 2) -> float | None:
-    """`value` as it is published: correctly rounded, half to even on its exact binary value. None stays None.
-
-    >>> rounded(14.296), rounded(0.125), rounded(None)
-    (14.3, 0.12, None)
-    """
-    if value is None:
-        return None
-    if not math.isfinite(value):
-        raise ValueError(f"Only finite numbers are published; found {value}.")
-    return round(float(value), decimals) + 0.0  # adding 0 turns -0.0 into 0.0
-
-
-def format_rounded(value: float | None, *, decimals: int = 2, missing: str = "–") -> str:
-    """The text of the published value with all its decimals, or `missing`.
-
-    >>> format_rounded(14.296), format_rounded(None)
-    ('14.30', '–')
-    """
-    shown = rounded(value, decimals=decimals)
-    return missing if shown is None else f"{shown:.{decimals}f}"
+            columns[f"{name}_low"], columns[f"{name}_high"] = row.intervals[name] or (None, None)
+    return columns

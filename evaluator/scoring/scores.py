@@ -42,8 +42,8 @@ from evaluator.predictions.alignment import ZERO_MESSAGE
 from evaluator.predictions.loading import Predictions
 from evaluator.predictions.revisions import realigned
 from evaluator.problems import Findings
-from evaluator.scoring.breakdown import Details
-from evaluator.scoring.report import RangeScore, RecordingSums, Report, format_rounded
+from evaluator.scoring.report import Report
+from evaluator.scoring.results import Details, RangeScore, RecordingSums, format_rounded
 from evaluator.truth.ground_truth import GroundTruth
 
 
@@ -122,6 +122,7 @@ class Scorer:
             # The same sequences, but the rows of the two files may have another order.
             predictions = realigned(predictions, manifest=self._truth.manifest)
         errors, n_truncated = self._errors(predictions)
+        details = self._details(predictions, errors) if keep_sequences else None
         return Report(
             protocol=self._protocol.name,
             truth_digest=self._truth.digest,
@@ -130,13 +131,9 @@ class Scorer:
             n_out_of_range=self._n_out_of_range,
             truncated=dict(zip(self._protocol.boundaries, n_truncated, strict=True)),
             scores={name: self._score(errors, part) for name, part in self._slices.items()},
-            sequences=self._in_file_order(errors) if keep_sequences else None,
+            sequences=details.errors if details else None,
             bags=self._recording_sums(errors) if keep_bags else None,
-            details=Details(
-                self._truth, predictions, _truncate(predictions.ttc_s, self._protocol)[0], self._protocol
-            )
-            if keep_sequences
-            else None,
+            details=details,
         )
 
     def _score(self, errors: Mapping[str, Floats], part: slice) -> RangeScore:
@@ -146,11 +143,12 @@ class Scorer:
         means = {name: float(np.add.reduce(values[part])) / count for name, values in errors.items()}
         return RangeScore(means, count)
 
-    def _in_file_order(self, errors: Mapping[str, Floats]) -> dict[str, Floats]:
-        found = {name: np.empty_like(values) for name, values in errors.items()}
+    def _details(self, predictions: Predictions, errors: Mapping[str, Floats]) -> Details:
+        in_file_order = {name: np.empty_like(values) for name, values in errors.items()}
         for name, values in errors.items():
-            found[name][self._truth.ascending_rows] = values
-        return found
+            in_file_order[name][self._truth.ascending_rows] = values
+        predicted_ttc_s, _ = _truncate(predictions.ttc_s, self._protocol)
+        return Details(self._truth, predictions, predicted_ttc_s, in_file_order, self._protocol)
 
     def _errors(self, predictions: Predictions) -> tuple[dict[str, Floats], tuple[int, ...]]:
         """Errors by metric in ascending τ, and the number of predictions that went to each boundary."""

@@ -109,32 +109,32 @@ def best_of(n: int) -> float:
     return step * sum(x * n * normal.pdf(x) * normal.cdf(x) ** (n - 1) for x in points) / math.sqrt(2)
 
 
-def told_apart(found: Sequence[Difference]) -> list[bool]:
+def significant_together(differences: Sequence[Difference]) -> list[bool]:
     """Which of several differences are significant with all of them tested together (Holm 1979).
 
     The smallest p is held against 0.05 / m, the next against 0.05 / (m − 1), until one is not below. Where
-    all are 0, any is told apart in at most 5 % of cases. Where p is not told, `p_below` counts as p. What has
+    all are 0, any is significant in at most 5 % of cases. Where p is unknown, `p_below` counts as p. What has
     neither is not tested.
 
-    >>> told_apart([Difference(-1, -2, -0.1, p) for p in (0.02, 0.01, 0.6)])
+    >>> significant_together([Difference(-1, -2, -0.1, p) for p in (0.02, 0.01, 0.6)])
     [True, True, False]
-    >>> told_apart([Difference(-1, -2, -0.1, p_below=below) for below in (0.01, 0.01, 1.0)])
+    >>> significant_together([Difference(-1, -2, -0.1, p_below=below) for below in (0.01, 0.01, 1.0)])
     [True, True, False]
     """
-    tested = sorted((p, i) for i, each in enumerate(found) if (p := _upper(each)) is not None)
-    apart = [False] * len(found)
+    tested = sorted((p, i) for i, each in enumerate(differences) if (p := _upper(each)) is not None)
+    apart = [False] * len(differences)
     for n_before, (p, i) in enumerate(tested):
         n_left = len(tested) - n_before
-        is_below = n_left * p < SIGNIFICANT or (found[i].p is None and n_left * p <= SIGNIFICANT)
+        is_below = n_left * p < SIGNIFICANT or (differences[i].p is None and n_left * p <= SIGNIFICANT)
         if not is_below:
             break
         apart[i] = True
     return apart
 
 
-def _upper(found: Difference) -> float | None:
+def _upper(difference: Difference) -> float | None:
     """The p of a difference, else what it is below."""
-    return found.p_below if found.p is None else found.p
+    return difference.p_below if difference.p is None else difference.p
 
 
 def too_few_units(n_effective: float | None, *, unit: str = RECORDING) -> str:

@@ -23,13 +23,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol
 from evaluator.metrics.scale import Floats
-from evaluator.predictions.loading import Predictions
-from evaluator.scoring.report import RecordingSums
-from evaluator.scoring.scores import Scorer
 from evaluator.scoring.significance import MIN_DEGREES
-from evaluator.truth.ground_truth import GroundTruth
 from evaluator.units import RECORDING, Units
 
 CONFIDENCE: Final = 0.95
@@ -150,7 +145,7 @@ class Bootstrap:
 
 
 def _tail(n_effective: float, *, degrees: float) -> float:
-    """The share of resamples beyond either end of a 95 % interval of so many units of equal size.
+    """The share of resamples beyond either end of a 95 % interval of `n_effective` units of equal size.
 
     Bare percentiles are those of a normal distribution whose variance is known, and n units scatter a
     little less about their own mean than about the true one: Φ(−t(97.5 %) · √(n / (n − 1))), the expanded
@@ -187,50 +182,17 @@ def _student(degrees: float) -> float:
 def _ends(deviations: Weights, *, tail: float) -> Floats:
     """The quantiles `tail` and 1 − `tail` of every row, (2, rows), as `numpy.quantile` takes them."""
     last = deviations.shape[1] - 1
-    places = [tail * last, (1 - tail) * last]
-    indices = sorted({i for place in places for i in (int(place), min(int(place) + 1, last))})
+    positions = [tail * last, (1 - tail) * last]
+    indices = sorted({i for position in positions for i in (int(position), min(int(position) + 1, last))})
     parted = np.partition(deviations, indices, axis=1)
-    found = []
-    for place in places:
-        i = int(place)
+    quantiles = []
+    for position in positions:
+        i = int(position)
         lower, upper = parted[:, i].astype(np.float64), parted[:, min(i + 1, last)].astype(np.float64)
-        found.append(lower + (upper - lower) * (place - i))
-    return np.stack(found)
+        quantiles.append(lower + (upper - lower) * (position - i))
+    return np.stack(quantiles)
 
 
 def bootstrap_of(truth_digest: str, counts: Floats) -> Bootstrap:
     """The weights that belong to a ground truth's revision."""
     return Bootstrap(counts, rng=generator_of(truth_digest, purpose="weights"))
-
-
-def recording_sums(
-    predictions: Predictions, truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL
-) -> RecordingSums:
-    """Sums per recording of one set of predictions; raises as `evaluator.evaluate` does."""
-    rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
-    bags = Scorer(truth, rules).report(predictions, keep_bags=True).bags
-    assert bags is not None  # noqa: S101 - they were asked for
-    return bags
-
-
-def confidence_intervals(
-    predictions: Predictions,
-    truth: GroundTruth,
-    *,
-    protocol: str | Protocol = DEFAULT_PROTOCOL,
-    unit: str | None = None,
-) -> dict[str, tuple[float, float] | None]:
-    """The 95 % interval of each number, as the board shows it; None where there is none.
-
-    `unit` is recording, day or given; None: by the rule, `truth.manifest.units`. Raises `ValueError` for a
-    unit that the recordings do not have.
-    """
-    rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
-    units = truth.manifest.units_by(unit)
-    bags = recording_sums(predictions, truth, protocol=rules)
-    sums, counts = (by_units(each, units) for each in (bags.sums, bags.counts))
-    low, high = (ends[0] for ends in bootstrap_of(truth.digest, counts).intervals(sums[None]))
-    return {
-        name: (float(low[i]), float(high[i])) if np.isfinite(low[i]) else None
-        for i, name in enumerate(rules.score_names)
-    }

@@ -99,7 +99,7 @@ def _caption(rows: Sequence[ResultRow]) -> str:
 
 def cells_of(row: ResultRow) -> Iterator[str]:
     """The scores as they are published, each with its interval where there is one."""
-    from evaluator.scoring.report import format_rounded  # noqa: PLC0415 -- loads numpy
+    from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy
 
     for name, value in row.scores.items():
         decimals = metric_of(name).decimals

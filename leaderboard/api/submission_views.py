@@ -1,7 +1,7 @@
 """Submitting and following submissions."""
 
 from datetime import datetime
-from typing import Any, cast
+from typing import cast
 from uuid import UUID
 
 from django.db.models import Prefetch
@@ -30,7 +30,7 @@ from leaderboard.models import Evaluation, Submission, User
 from leaderboard.quotas import limits
 from leaderboard.submissions import intake, outcomes
 
-TEXT_FIELDS = ("description", "paper_url", "code_url", "note", "commit")
+DETAIL_FIELDS = ("description", "paper_url", "code_url")
 # While a submission waits or runs; a file is scored within a second.
 ASK_AGAIN_S = 1
 
@@ -58,7 +58,7 @@ class SubmissionsView(APIView):
         form = cast("QueryDict", request.data)  # the only parser here is that of multipart bodies
         require_split(request.auth, str(form.get("split", "")))
         now = timezone.now()
-        answer = _submit(request, form, now=now)
+        answer = intake.submit(_submission_request(request, form, now=now))
         made = answer.submission
         quota = limits.state(
             team=made.method.team, user=cast("User", request.user), split=made.split, now=now
@@ -106,11 +106,10 @@ class SubmissionView(APIView):
         return Response(SubmissionSerializer(view).data, headers=again)
 
 
-def _submit(request: Request, form: QueryDict, *, now: datetime) -> intake.Submitted:
-    """The submission of this request, or the one that had the same bytes before."""
+def _submission_request(request: Request, form: QueryDict, *, now: datetime) -> intake.SubmissionRequest:
+    """The submission that a form of this request asks for."""
     user, upload = cast("User", request.user), request.FILES.get("file")
-    texts: dict[str, Any] = {name: str(form.get(name, "")) for name in TEXT_FIELDS}
-    return intake.submit(
+    return intake.SubmissionRequest(
         user=user,
         split_name=str(form.get("split", "")),
         method_name=editing.name_meant(user=user, text=str(form.get("method", ""))),
@@ -118,6 +117,8 @@ def _submit(request: Request, form: QueryDict, *, now: datetime) -> intake.Submi
         via=Submission.Via.API,
         now=now,
         filename=getattr(upload, "name", "") or "",
+        details={name: str(form.get(name, "")) for name in DETAIL_FIELDS},
+        note=str(form.get("note", "")),
+        commit=str(form.get("commit", "")),
         may_edit=split_of(request.auth) is None,
-        **texts,
     )

@@ -233,16 +233,17 @@ def _submit(entry: DemoEntry, *, user: User, truth: evaluator.GroundTruth, now: 
     """Send the entry's file, and say and show of its method what the demo does: all of it, or nothing."""
     data = predictions_file(entry, truth=truth)
     with transaction.atomic():
-        method = intake.submit(
+        request = intake.SubmissionRequest(
             user=user,
             split_name=SPLIT,
             method_name=entry.method,
-            description=entry.full_description,
+            details={"description": entry.full_description},
             upload=ContentFile(data),
             filename=f"{entry.method.lower().replace(',', '').replace(' ', '-')}.json",
             via=Submission.Via.WEB,
             now=now,
-        ).submission.method
+        )
+        method = intake.submit(request).submission.method
         editing.edit(method=method, changes=entry.details, actor=user)
         if entry.visibility != Visibility.PRIVATE:
             visibility.change(method=method, visibility=entry.visibility, actor=user, now=now)

@@ -4,7 +4,7 @@ from typing import Final
 from xml.sax.saxutils import escape, quoteattr
 
 from evaluator.metrics.protocol import PRIMARY
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from evaluator.tables.escaping import one_line
 from leaderboard.boards.rows import Entry
 

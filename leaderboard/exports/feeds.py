@@ -14,7 +14,7 @@ from django.urls import reverse
 from django.utils.feedgenerator import Atom1Feed
 
 from evaluator.metrics.protocol import grouped_names
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from evaluator.tables.escaping import one_line
 from leaderboard.boards.rows import Entry
 from leaderboard.models import Split

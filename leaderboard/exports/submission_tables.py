@@ -9,7 +9,7 @@ from datetime import datetime
 from typing import Final
 
 from evaluator.metrics.protocol import known_names
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import flat_scores
 from leaderboard.models import Evaluation, Submission
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Final
 
 from evaluator.metrics.protocol import PRIMARY
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from evaluator.tables import layouts
 from evaluator.tables.layouts import Export
 from evaluator.units import RECORDING

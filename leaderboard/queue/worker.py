@@ -16,7 +16,7 @@ from django.db import DataError, IntegrityError, InterfaceError, OperationalErro
 from evaluator import Rejected, Report, rounded
 from evaluator.predictions.plausibility import warnings_of
 from evaluator.problems import FileWarning
-from evaluator.scoring.report import RecordingSums
+from evaluator.scoring.results import RecordingSums
 from evaluator.scoring.scores import Scorer
 from leaderboard.models import Edition, Evaluation, SentFile, Status
 from leaderboard.queue import lifecycle

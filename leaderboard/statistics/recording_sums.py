@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from evaluator import GroundTruth, rounded
 from evaluator.metrics.protocol import get_protocol
 from evaluator.scoring import scores, uncertainty
-from evaluator.scoring.report import RecordingSums
+from evaluator.scoring.results import RecordingSums
 from evaluator.scoring.scores import Scorer
 from evaluator.units import Units
 from leaderboard.models import Edition, SentFile

@@ -1,9 +1,9 @@
 """Submissions: one file for one split, acknowledged only once it can no longer be lost."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from datetime import datetime, timedelta
-from typing import Any
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from typing import Any, NamedTuple
 
 import structlog
 from django.conf import settings
@@ -13,22 +13,56 @@ from django.db.models import Q
 
 from evaluator.predictions.documents import EMPTY_MESSAGE
 from leaderboard import audit, board_versions
-from leaderboard.boards.rows import ConfidenceInterval, scored_of
-from leaderboard.db import clock
 from leaderboard.errors.refusals import Refused, clean_text, shown_split
 from leaderboard.methods import editing
-from leaderboard.models import Evaluation, Method, SentFile, Split, Status, Submission, Team, User
+from leaderboard.models import Method, SentFile, Split, Submission, Team, User
 from leaderboard.people import teams
 from leaderboard.people.names import clean_name
 from leaderboard.queue import lifecycle
 from leaderboard.quotas import admissions, limits
 from leaderboard.storage import files, orphans
-from leaderboard.submissions import status_text
 
 log = structlog.get_logger(__name__)
 
-# A file is scored within a second; one that has waited for longer than this has met a fault.
-LATE_AFTER = timedelta(minutes=1)
+
+@dataclass(frozen=True, kw_only=True)
+class SubmissionRequest:
+    """A file to submit, as it was sent; empty `details` of the method change nothing."""
+
+    user: User
+    split_name: str
+    method_name: str
+    upload: "File[bytes] | None"
+    via: str
+    now: datetime
+    filename: str = ""
+    details: Mapping[str, Any] = field(default_factory=dict)
+    note: str = ""
+    commit: str = ""
+    may_edit: bool = True
+
+    def cleaned(self) -> "SubmissionRequest":
+        """The request with clean texts and details. Raises `Refused`."""
+        return replace(
+            self,
+            method_name=clean_name("method", self.method_name),
+            details=editing.cleaned(self.details),
+            filename=_clean_filename(self.filename),
+            note=clean_text("note", self.note, limit=500, required=False),
+            commit=clean_text("commit", self.commit, limit=64, required=False),
+        )
+
+    def changes_of(self, method: Method | None) -> dict[str, Any]:
+        """The details that the request changes; none of a method yet to be made. Raises `Refused`."""
+        if method is None:
+            editing.require_hardware(self.details, method=None)
+            return {}
+        given = {name: value for name, value in self.details.items() if value not in (None, "")}
+        changes = {name: value for name, value in given.items() if getattr(method, name) != value}
+        if changes and not self.may_edit:
+            raise _token_split(method, changes)
+        editing.require_hardware(changes, method=method)
+        return changes
 
 
 @dataclass(frozen=True)
@@ -39,146 +73,99 @@ class Submitted:
     is_new: bool
 
 
-def submit(
-    *,
-    user: User,
-    split_name: str,
-    method_name: str,
-    upload: File | None,
-    via: str,
-    now: datetime,
-    filename: str = "",
-    description: str = "",
-    paper_url: str = "",
-    code_url: str = "",
-    method_details: Mapping[str, object] | None = None,
-    note: str = "",
-    commit: str = "",
-    may_edit: bool = True,
-) -> Submitted:
+def submit(request: SubmissionRequest) -> Submitted:
     """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
 
     The same bytes again, for the same split, method and manifest, are answered with the first submission and
     change nothing. Details that differ from the method's own replace them; without `may_edit` they are
     refused. Raises `Refused` or `limits.QuotaExceeded` (nothing is kept then).
     """
-    split = _open_split(split_name, now=now)
-    asked = _Asked(
-        user=user,
-        split=split,
-        method_name=clean_name("method", method_name),
-        details=editing.cleaned(
-            {
-                "description": description,
-                "paper_url": paper_url,
-                "code_url": code_url,
-                **(method_details or {}),
-            }
-        ),
-        row={
-            "via": via,
-            "filename": _clean_filename(filename),
-            "note": clean_text("note", note, limit=500, required=False),
-            "commit": clean_text("commit", commit, limit=64, required=False),
-        },
-        upload=_checked(upload),
-        now=now,
-        may_edit=may_edit,
-    )
-    file = files.measure(asked.upload)
-    first = _admit(asked, file)
-    if first is not None:
-        return Submitted(submission=first, is_new=False)
-    files.save_predictions(asked.upload, measured=file, now=now)
+    split = _open_split(request.split_name, now=request.now)
+    request = request.cleaned()
+    upload = _checked(request.upload)
+    file = files.measure(upload)
+    team = teams.current_team_of(user=request.user)
+    answers = _answers(request, file, split=split, team=team)
+    if answers.sent_before is not None:
+        return Submitted(submission=answers.sent_before, is_new=False)
+    files.save_predictions(upload, measured=file, now=request.now)
     with orphans.unless_refused(Refused, limits.QuotaExceeded, digest=file.digest), transaction.atomic():
-        submitted = _record(asked, file)
+        orphans.lock(file.digest)
+        files.require_unchanged(upload, digest=file.digest)
+        submitted = _record(request, file, split=split)
     if submitted.is_new:
         log.info(
             "submission_received",
             submission_id=str(submitted.submission.pk),
             split=split.pk,
-            via=via,
+            via=request.via,
             digest=file.digest,
             size_bytes=file.size_bytes,
         )
     return submitted
 
 
-@dataclass(frozen=True)
-class _Asked:
-    """A request to submit, its texts clean."""
+class _Answers(NamedTuple):
+    """The team's method of that name, its submission of the same bytes, and the changes of its details."""
 
-    user: User
-    split: Split
-    method_name: str
-    details: Mapping[str, Any]  # of the method; an empty one says nothing, and changes nothing
-    row: Mapping[str, str]  # what stands in the submission's row as it came
-    upload: "File[bytes]"
-    now: datetime
-    may_edit: bool
-
-    def changes_of(self, method: Method) -> dict[str, Any]:
-        """What the request changes of the method. Raises `Refused`."""
-        given = {name: value for name, value in self.details.items() if value not in (None, "")}
-        changes = {name: value for name, value in given.items() if getattr(method, name) != value}
-        if changes and not self.may_edit:
-            raise _token_split(method, changes)
-        editing.require_hardware(changes, method=method)
-        return changes
+    method: Method | None
+    sent_before: Submission | None
+    changes: Mapping[str, Any]
 
 
-def _admit(asked: _Asked, file: files.StoredFile) -> Submission | None:
-    """Refuse what cannot be taken, before its bytes are written; `_record` decides under locks.
+def _answers(
+    request: SubmissionRequest, file: files.StoredFile, *, split: Split, team: Team | None
+) -> _Answers:
+    """Ask what decides on a file, in this order: admission, same bytes, quota, changes, name.
 
-    Returns the submission that had the same bytes before. Raises `Refused` or `limits.QuotaExceeded`.
+    Asked twice: before the bytes are written, to spare the disk, and with split and team locked, for certain.
+    Raises `Refused` or `limits.QuotaExceeded`.
     """
-    team = teams.current_team_of(user=asked.user)
-    admissions.require(team=team, split=asked.split)
-    method = Method.objects.existing().filter(team=team, name=asked.method_name).first()
-    first = _sent_before(file, split=asked.split, method=method) if method else None
-    if first is not None:
-        return first
-    limits.require(team=team, user=asked.user, split=asked.split, size_bytes=file.size_bytes, now=asked.now)
-    if method is not None:
-        asked.changes_of(method)
-    else:
-        editing.require_hardware(asked.details, method=None)
-        if team is not None:
-            editing.require_distinct_name(asked.method_name, team=team, field="method", may_exist=True)
-    return None
-
-
-def _record(asked: _Asked, file: files.StoredFile) -> Submitted:
-    """Write the rows of a stored file and queue it. Raises `Refused` or `limits.QuotaExceeded`."""
-    orphans.lock(file.digest)
-    files.require_unchanged(asked.upload, digest=file.digest)
-    # From here on the board stays, so the file is queued in an edition with the manifest that its row names.
-    split = Split.objects.select_related("published_edition__ground_truth").lock_shared(asked.split.pk)
-    team = _held_team(asked.user)
     admissions.require(team=team, split=split)
-    method = _method(asked, team=team)
-    first = _sent_before(file, split=split, method=method)
-    if first is not None:
-        return Submitted(submission=first, is_new=False)
-    changes = asked.changes_of(method)
-    limits.require(team=team, user=asked.user, split=split, size_bytes=file.size_bytes, now=asked.now)
+    method = Method.objects.existing().filter(team=team, name=request.method_name).first()
+    sent_before = _sent_before(file, split=split, method=method) if method else None
+    if sent_before is not None:
+        return _Answers(method, sent_before, {})
+    limits.require(team=team, user=request.user, split=split, size_bytes=file.size_bytes, now=request.now)
+    changes = request.changes_of(method)
+    if method is None and team is not None:
+        # Without the lock another request may be making this very method, which is no other name.
+        editing.require_distinct_name(request.method_name, team=team, field="method", may_exist=True)
+    return _Answers(method, None, changes)
+
+
+def _record(request: SubmissionRequest, file: files.StoredFile, *, split: Split) -> Submitted:
+    """Write the rows of a stored file and queue it. Raises `Refused` or `limits.QuotaExceeded`."""
+    # From here on the board stays, so the file is queued in an edition with the manifest that its row names.
+    split = Split.objects.select_related("published_edition__ground_truth").lock_shared(split.pk)
+    team = _locked_team(request.user)
+    method, sent_before, changes = _answers(request, file, split=split, team=team)
+    if sent_before is not None:
+        return Submitted(submission=sent_before, is_new=False)
+    if method is None:
+        method = Method.objects.create(
+            team=team, name=request.method_name, created_at=request.now, **request.details
+        )
     submission = Submission.objects.create(
         split=split,
         method=method,
-        submitted_by=asked.user,
-        submitted_at=asked.now,
+        submitted_by=request.user,
+        submitted_at=request.now,
         **_sent_file(file, split)._asdict(),
         size_bytes=file.size_bytes,
-        **asked.row,
+        via=request.via,
+        filename=request.filename,
+        note=request.note,
+        commit=request.commit,
     )
     _queue(submission, split=split)
     if changes:
-        submission.method = editing.edit(method=method, changes=changes, actor=asked.user)
-    audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=asked.user)
+        submission.method = editing.edit(method=method, changes=changes, actor=request.user)
+    audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=request.user)
     return Submitted(submission=submission, is_new=True)
 
 
-def _held_team(user: User) -> Team:
+def _locked_team(user: User) -> Team:
     """The person's team, new if there is none, locked until the transaction ends."""
     limits.hold_accounts(user=user)
     team = teams.team_of(user=user)
@@ -231,26 +218,15 @@ def _checked(upload: "File[bytes] | None") -> "File[bytes]":
     if upload.size == 0:
         raise Refused("not-json", EMPTY_MESSAGE, field="file")
     if upload.size > settings.MAX_PREDICTIONS_BYTES:
-        raise Refused("too-large", too_large(found_bytes=upload.size), field="file")
+        raise Refused("too-large", too_large(n_bytes=upload.size), field="file")
     return upload
 
 
-def too_large(*, found_bytes: int) -> str:
+def too_large(*, n_bytes: int) -> str:
     return (
-        f"The file has {found_bytes:,} bytes; expected at most {settings.MAX_PREDICTIONS_BYTES:,} "
+        f"The file has {n_bytes:,} bytes; expected at most {settings.MAX_PREDICTIONS_BYTES:,} "
         f"({settings.MAX_PREDICTIONS_BYTES / 1e6:g} MB)."
     )
-
-
-def _method(asked: _Asked, *, team: Team) -> Method:
-    """The team's method of that name, made if there is none, in a locked team. Raises `Refused`."""
-    method = Method.objects.existing().filter(team=team, name=asked.method_name).first()
-    if method is None:
-        editing.require_distinct_name(asked.method_name, team=team, field="method")
-        method = Method.objects.create(
-            team=team, name=asked.method_name, created_at=asked.now, **asked.details
-        )
-    return method
 
 
 def _clean_filename(name: str) -> str:
@@ -275,102 +251,3 @@ def withdraw(*, submission: Submission, actor: User, now: datetime) -> bool:
             board_versions.bump(submission.split_id)
     submission.withdrawn_at = now
     return True
-
-
-# --- how it goes -----------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Progress:
-    """What its team sees of a submission."""
-
-    state: str
-    received_at: datetime
-    queued_at: datetime | None = None
-    started_at: datetime | None = None
-    finished_at: datetime | None = None
-    n_ahead: int | None = None
-    is_late: bool = False  # it takes longer than `LATE_AFTER`
-    first_run: Evaluation | None = None  # in the first edition, where another edition's speaks for it
-    scores: Mapping[str, float | None] | None = None
-    intervals: Mapping[str, ConfidenceInterval] = field(default_factory=dict)  # by score name, where computed
-    counts: Mapping[str, int] = field(default_factory=dict)
-    truncated: Mapping[str, int] = field(default_factory=dict)
-    n_out_of_range: int | None = None
-    warnings: list[dict[str, str]] = field(default_factory=list)  # of a scored file: code and message
-    problems: list[dict[str, str]] = field(default_factory=list)
-    n_problems: int = 0
-    fault_is_ours: bool = False
-    sentence: str = ""
-    is_final: bool = False
-    edition_number: int | None = None
-    protocol: str = ""
-    decimals: int = 2  # of its values
-    kept_in: int | None = None  # rejected here: the number of the last published edition that scored it
-
-
-def evaluation_of(submission: Submission) -> Evaluation:
-    """The evaluation shown for a submission: in the published edition, else the latest, drafts last."""
-    published = submission.split.published_edition_id
-    evaluations = sorted(submission.evaluations.all(), key=_place_of_edition)
-    return next((e for e in evaluations if e.edition_id == published), evaluations[-1])
-
-
-def _first_run(submission: Submission, speaking: Evaluation) -> Evaluation | None:
-    first = min(submission.evaluations.all(), key=lambda each: each.edition.number)
-    return first if first.pk != speaking.pk and first.is_final else None
-
-
-def _place_of_edition(evaluation: Evaluation) -> tuple[bool, int]:
-    return evaluation.edition.published_at is not None, evaluation.edition.number
-
-
-def progress(submission: Submission) -> Progress:
-    """How far a submission is, and what came of it."""
-    evaluation = evaluation_of(submission)
-    report = evaluation.report or {}
-    rules, counts, truncated = evaluation.edition.rules, report.get("counts", {}), report.get("truncated", {})
-    scored = scored_of(evaluation) if evaluation.status == Status.SCORED else None
-    return Progress(
-        state=evaluation.status,
-        received_at=submission.submitted_at,
-        queued_at=evaluation.queued_at,
-        started_at=evaluation.started_at,
-        finished_at=evaluation.finished_at,
-        n_ahead=None if evaluation.is_final else _n_ahead(evaluation),
-        is_late=not evaluation.is_final and _is_late(evaluation),
-        first_run=_first_run(submission, evaluation),
-        scores=scored.values if scored else None,
-        intervals=scored.intervals if scored else {},
-        # PostgreSQL gives JSON back in an order of its own.
-        counts={name: counts[name] for name in rules.range_names if name in counts},
-        truncated={name: truncated[name] for name in rules.boundaries if name in truncated},
-        n_out_of_range=report.get("n_out_of_range"),
-        warnings=report.get("warnings", []),
-        problems=evaluation.problems,
-        n_problems=evaluation.n_problems,
-        fault_is_ours=evaluation.status == Status.SYSTEM_ERROR,
-        sentence=status_text.sentence_of(evaluation),
-        is_final=evaluation.is_final,
-        edition_number=evaluation.edition.number,
-        decimals=evaluation.edition.decimals,
-        protocol=evaluation.edition.protocol,
-        kept_in=evaluation.kept_in,
-    )
-
-
-def _n_ahead(evaluation: Evaluation) -> int:
-    if evaluation.status != Status.QUEUED:
-        return 0
-    earlier = Q(priority__lt=evaluation.priority) | Q(
-        priority=evaluation.priority, queued_at__lt=evaluation.queued_at
-    )
-    # What has stopped its reader waits behind all others.
-    waiting = Evaluation.objects.due().filter(earlier, n_poison_strikes__lte=evaluation.n_poison_strikes)
-    return waiting.exclude(pk=evaluation.pk).count()
-
-
-def _is_late(evaluation: Evaluation) -> bool:
-    # Re-scoring goes in batches behind everything else: it may take its time.
-    is_live = evaluation.priority == Evaluation.PRIORITY_LIVE
-    return is_live and clock.database_now() - evaluation.queued_at > LATE_AFTER

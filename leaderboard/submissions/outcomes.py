@@ -14,8 +14,7 @@ from leaderboard.boards.rows import ConfidenceInterval, Entry, profile_of, score
 from leaderboard.boards.snapshots import CurrentBoard
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, Visibility
 from leaderboard.statistics import confidence
-from leaderboard.submissions import intake
-from leaderboard.submissions.intake import Progress
+from leaderboard.submissions.progress import Progress, evaluation_of, progress_of
 
 # How long pages say that intervals are about to come; they usually take a second or two.
 AWAITED_FOR = timedelta(minutes=5)
@@ -51,7 +50,7 @@ class SubmissionView:
 
 def for_submissions(rows: Iterable[Submission], *, now: datetime) -> tuple[SubmissionView, ...]:
     """The views of these submissions, best fetched with their evaluations, editions and scores."""
-    pairs = [(submission, intake.progress(submission)) for submission in rows]
+    pairs = [(submission, progress_of(submission)) for submission in rows]
     positions = _positions([each for each in pairs if _is_on_board(*each)])
     return tuple(
         SubmissionView(
@@ -91,7 +90,7 @@ def awaits_intervals(submission: Submission, progress: Progress, *, now: datetim
         return False
     if now - progress.finished_at >= AWAITED_FOR:
         return False
-    edition = intake.evaluation_of(submission).edition
+    edition = evaluation_of(submission).edition
     return edition.discarded_at is None and not confidence.why_no_interval(edition)
 
 
@@ -101,7 +100,7 @@ def why_no_intervals(submission: Submission, progress: Progress, *, now: datetim
         return ""
     if awaits_intervals(submission, progress, now=now):
         return "The confidence intervals are being computed."
-    return confidence.why_no_interval(intake.evaluation_of(submission).edition) or (
+    return confidence.why_no_interval(evaluation_of(submission).edition) or (
         "There are no confidence intervals yet. They are computed when no submission is waiting."
     )
 

@@ -11,7 +11,7 @@ from evaluator import receipts
 from leaderboard.boards.rows import flat_scores
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Evaluation, Status, Submission
-from leaderboard.submissions import intake
+from leaderboard.submissions.progress import evaluation_of
 
 MEDIA_TYPE: Final = "application/jwt"
 
@@ -45,7 +45,7 @@ def _scored(submission: Submission, edition_number: int | None) -> Evaluation:
     if submission.withdrawn_at:
         raise Refused("withdrawn", "The submission is withdrawn; expected one that is not.")
     if edition_number is None:
-        evaluation = intake.evaluation_of(submission)
+        evaluation = evaluation_of(submission)
     else:
         # An edition in preparation may still be given up: nothing of it is anybody's to quote.
         published = submission.evaluations.exclude(edition__published_at=None)

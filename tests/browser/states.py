@@ -81,7 +81,7 @@ def _move(submission: Submission, shift: timedelta) -> None:
 def failures() -> str:
     """The pages for what goes wrong before or outside of any view, by name, as JSON."""
     too_many = {"sentence": rate_limits.refusal(125.0), "back": "/submit/"}
-    too_large = {"sentence": intake.too_large(found_bytes=34_000_000)}
+    too_large = {"sentence": intake.too_large(n_bytes=34_000_000)}
     pages = {
         "failure-400": ("400.html", {}),
         "failure-403": ("403.html", {}),

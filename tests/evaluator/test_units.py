@@ -17,7 +17,8 @@ from evaluator import (
     read_manifest,
     read_truth,
 )
-from evaluator.scoring.uncertainty import bootstrap_of, by_units, recording_sums
+from evaluator.scoring.intervals import recording_sums
+from evaluator.scoring.uncertainty import bootstrap_of, by_units
 from evaluator.truth.csv_tables import Table
 from evaluator.units import DAY, GIVEN, RECORDING, units_of
 from tests.evaluator.recordings import predictions

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from evaluator.counting import counted
 from evaluator.metrics.protocol import PRIMARY
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import history
 from leaderboard.editions.corrections import RescoringProgress

@@ -17,7 +17,7 @@ from evaluator.metrics.protocol import (
     range_of,
     split_name,
 )
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.web.boards import whiskers
 from leaderboard.web.boards.board_query import BoardQuery

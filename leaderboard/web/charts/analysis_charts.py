@@ -7,7 +7,7 @@ from typing import Any, Final
 from evaluator.counting import counted
 from evaluator.metrics.protocol import known_metrics
 from evaluator.metrics.registry import MID, Metric
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from leaderboard.models import Analysis
 from leaderboard.web.charts.chart_options import (
     Chart,

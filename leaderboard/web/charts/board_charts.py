@@ -15,7 +15,7 @@ from django.utils.safestring import SafeString
 
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.metrics.registry import MID
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import Entry
 from leaderboard.boards.snapshots import Attempt
 from leaderboard.exports.tables import team_of

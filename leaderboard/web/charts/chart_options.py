@@ -13,7 +13,7 @@ from typing import Any, Final
 from django.urls import reverse
 
 from evaluator.metrics.registry import Metric
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import Entry
 
 Option = dict[str, Any]

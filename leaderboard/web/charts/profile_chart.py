@@ -6,7 +6,7 @@ from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
 from evaluator.metrics.protocol import OVERALL, PRIMARY, grouped_names, metric_of, range_of, split_name
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.web.boards.score_columns import figure_css, interval_words
 from leaderboard.web.boards.tables import rank_range

@@ -10,8 +10,8 @@ from django.utils.text import get_text_list
 
 from evaluator import Difference
 from evaluator.metrics.protocol import PRIMARY, grouped_names
-from evaluator.scoring.report import format_rounded
-from evaluator.scoring.significance import told_apart, too_few_units
+from evaluator.scoring.results import format_rounded
+from evaluator.scoring.significance import significant_together, too_few_units
 from evaluator.tables import sentences
 from evaluator.tables.sentences import p_cell
 from evaluator.units import in_words
@@ -70,7 +70,7 @@ def _worse_and_alike(best: Entry, tested: Sequence[Pair]) -> tuple[list[str], li
     holds first: nothing is worse that it marks as possibly the best, and ranks whose ranges do not meet
     differ.
     """
-    apart = told_apart([(pair.differences or {})[PRIMARY] for pair in tested])
+    apart = significant_together([(pair.differences or {})[PRIMARY] for pair in tested])
     worse: list[str] = []
     alike: list[str] = []
     for pair, is_apart in zip(tested, apart, strict=True):

@@ -7,7 +7,7 @@ from django.utils.text import get_text_list
 
 from evaluator.counting import counted
 from evaluator.metrics.protocol import PRIMARY
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from leaderboard.boards.listing import Board
 from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.exports.tables import team_of

@@ -8,7 +8,7 @@ from typing import Final
 from django.urls import reverse
 
 from evaluator.metrics.protocol import PRIMARY
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from leaderboard.boards import snapshots
 from leaderboard.boards.rows import Entry
 from leaderboard.editions import history

@@ -10,13 +10,13 @@ from urllib.parse import urlencode
 from django.urls import reverse
 
 from evaluator.metrics.protocol import OVERALL, PRIMARY
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from evaluator.tables import sentences
 from leaderboard.boards.results import Result
 from leaderboard.boards.rows import Entry, flat_scores
 from leaderboard.models import Edition, Evaluation, Status, Submission
 from leaderboard.statistics.comparisons import MIN_METHODS
-from leaderboard.submissions.intake import evaluation_of
+from leaderboard.submissions.progress import evaluation_of
 from leaderboard.web.boards.score_columns import (
     Cell,
     Group,

@@ -31,7 +31,7 @@ class UploadLimitMiddleware:
         announced = request.META.get("CONTENT_LENGTH") or "0"
         if announced.isdecimal() and int(announced) <= settings.MAX_PREDICTIONS_BYTES + FORM_BYTES:
             return self.get_response(request)
-        sentence = intake.too_large(found_bytes=int(announced) if announced.isdecimal() else 0)
+        sentence = intake.too_large(n_bytes=int(announced) if announced.isdecimal() else 0)
         if request.path.startswith("/api/"):
             return problem_codes.response(status=413, code="too-large", detail=sentence, where="file")
         return render(request, "413.html", {"sentence": sentence}, status=413)

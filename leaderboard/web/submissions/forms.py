@@ -14,11 +14,11 @@ from django.utils import timezone
 
 from evaluator.predictions.documents import EMPTY_MESSAGE
 from leaderboard.methods import visibility
-from leaderboard.methods.details import DETAILS
 from leaderboard.models import Method, Split, Submission, User
 from leaderboard.people import teams
 from leaderboard.quotas import admissions, limits
 from leaderboard.submissions import search
+from leaderboard.submissions.intake import SubmissionRequest
 from leaderboard.web.methods.method_forms import DetailsForm
 
 
@@ -122,21 +122,20 @@ class SubmissionForm(DetailsForm):
         fields = (*self.described, *self.detailed)
         return not self.methods or any(field.value() or field.errors for field in fields)
 
-    def submission(self) -> dict[str, Any]:
-        """Return the cleaned fields under the domain function's names."""
+    def submission_request(self, *, now: datetime) -> SubmissionRequest:
+        """The submission that the valid form asks for."""
         fields = self.cleaned_data
-        return {
-            "split_name": fields["split"],
-            "method_name": fields["method"],
-            "upload": fields["file"],
-            "filename": fields["file"].name or "",
-            "via": Submission.Via.WEB,
-            "description": fields["description"],
-            "paper_url": fields["paper_url"],
-            "code_url": fields["code_url"],
-            "method_details": {detail.name: fields[detail.name] for detail in DETAILS},
-            "note": fields["note"],
-        }
+        return SubmissionRequest(
+            user=self._user,
+            split_name=fields["split"],
+            method_name=fields["method"],
+            upload=fields["file"],
+            via=Submission.Via.WEB,
+            now=now,
+            filename=fields["file"].name or "",
+            details={field.name: fields[field.name] for field in (*self.described, *self.detailed)},
+            note=fields["note"],
+        )
 
 
 def parse_uuid(text: str) -> UUID | None:

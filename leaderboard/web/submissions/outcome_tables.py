@@ -8,14 +8,14 @@ from django.urls import reverse
 
 from evaluator.counting import counted
 from evaluator.metrics.protocol import grouped_names, split_name
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import Entry
 from leaderboard.exports import tables
 from leaderboard.models import Submission, Visibility
 from leaderboard.quotas.limits import Quota
 from leaderboard.submissions import outcomes
-from leaderboard.submissions.intake import Progress
 from leaderboard.submissions.outcomes import BoardPosition
+from leaderboard.submissions.progress import Progress
 from leaderboard.web.boards.tables import rank_range
 from leaderboard.web.formatting import signed
 from leaderboard.web.methods.result_tables import result_groups

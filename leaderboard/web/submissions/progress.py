@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Final
 
 from leaderboard.models import Evaluation, Status
-from leaderboard.submissions.intake import Progress
+from leaderboard.submissions.progress import Progress
 from leaderboard.web.formatting import grouped
 
 MAX_POINTS: Final = 20

@@ -28,7 +28,7 @@ from leaderboard.quotas import limits
 from leaderboard.statistics import analyses
 from leaderboard.storage import manifests
 from leaderboard.submissions import intake, outcomes, receipts, search
-from leaderboard.submissions.intake import Progress
+from leaderboard.submissions.progress import Progress, progress_of
 from leaderboard.web.boards import edition_tables
 from leaderboard.web.charts import analysis_charts
 from leaderboard.web.decorators import own_form, own_page
@@ -50,7 +50,7 @@ def submit(request: HttpRequest) -> HttpResponse:
     form = SubmissionForm(user, request)
     if request.method == "POST" and form.is_valid():
         try:
-            submitted = intake.submit(user=user, now=timezone.now(), **form.submission())
+            submitted = intake.submit(form.submission_request(now=timezone.now()))
         except (intake.Refused, limits.QuotaExceeded) as refusal:
             form.refuse(refusal)
         else:
@@ -123,7 +123,7 @@ def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     user = cast("User", request.user)
     own = Submission.objects.filter(method__team__memberships__user=user)
     row = get_object_or_404(own.select_related("method__team", "split"), pk=submission_id)
-    before = intake.progress(row)
+    before = progress_of(row)
     if request.method == "POST" and intake.withdraw(submission=row, actor=user, now=timezone.now()):
         done = "withdrawn" if before.is_final else "cancelled"
         messages.success(request, f"The submission is {done}.")
@@ -142,7 +142,7 @@ def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, P
         .prefetch_related(Prefetch("evaluations", evaluations))
     )
     row = get_object_or_404(rows, pk=submission_id)
-    progress = intake.progress(row)
+    progress = progress_of(row)
     awaits = outcomes.awaits_intervals(row, progress, now=timezone.now())
     return row, progress, state_line(progress, awaits_intervals=awaits)
 
@@ -179,7 +179,7 @@ def analysis(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """Error by time to contact, its distribution, predicted against true, the worst recordings."""
     rows = Submission.objects.visible_to(request.user).select_related("method", "split__published_edition")
     row = get_object_or_404(rows, pk=submission_id, split__is_hidden=False)
-    progress = intake.progress(row)
+    progress = progress_of(row)
     if progress.is_final and progress.state != Status.SCORED:
         raise Http404("This submission has no score.")
     closer = analyses.for_submission(submission=row, viewer=request.user)

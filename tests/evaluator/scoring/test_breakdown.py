@@ -63,7 +63,7 @@ def test_the_interval_of_one_group_of_all_is_the_board_s(
     truth: GroundTruth, predictions: Predictions, report: Report
 ) -> None:
     assert report.sequences is not None
-    (whole,) = scores_of(report.details, report.sequences, groups={"all": np.arange(N)}, with_intervals=True)
+    (whole,) = scores_of(report.details, groups={"all": np.arange(N)}, with_intervals=True)
     board = confidence_intervals(predictions, truth)
     assert list(whole.intervals) == list(board)
     for name, ends in board.items():

@@ -6,6 +6,7 @@ from scipy import stats
 
 from evaluator import SCORE_NAMES, confidence_intervals, evaluate
 from evaluator.scoring import uncertainty
+from evaluator.scoring.intervals import recording_sums
 from evaluator.scoring.uncertainty import Bootstrap
 from tests.evaluator.recordings import N_BAGS, Floats, predictions, some_sums, world
 
@@ -44,7 +45,7 @@ def test_sums_per_recording_are_those_of_a_loop_and_add_up_to_the_report() -> No
 def test_intervals_are_those_of_a_plain_loop_over_the_same_weights() -> None:
     truth = world(3)
     mine = predictions(truth, 4)
-    bags = uncertainty.recording_sums(mine, truth)
+    bags = recording_sums(mine, truth)
     weights = uncertainty.generator_of(truth.digest, purpose="weights").standard_exponential(
         (10_000, N_BAGS), dtype=np.float32
     )

@@ -12,7 +12,7 @@ from leaderboard.models import Edition, Publication, Split, Status, Submission, 
 from leaderboard.people import teams
 from leaderboard.quotas import limits
 from leaderboard.quotas.limits import Quota
-from leaderboard.submissions import intake
+from leaderboard.submissions.progress import progress_of
 from tests import builders
 from tests.editions import extended, open_edition, publish, roll_back
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -73,7 +73,7 @@ def test_the_slot_is_given_back_for_as_long_as_the_board_rejects_the_entry(
     assert (quota.used, quota.n_rejected, quota.is_open) == (0, 0, True)
     new = builders.submit(owner, builders.predictions(adding), method="Foo")
     builders.score_all()
-    assert intake.progress(new).state == Status.SCORED
+    assert progress_of(new).state == Status.SCORED
     assert left(owner).used == 1
     roll_back()
     assert left(owner).used == 2
@@ -92,5 +92,5 @@ def test_the_words_are_true_wherever_they_stand(
     outcome = page.one("div", id="outcome").text
     assert text in outcome
     assert "problem in the file" not in outcome
-    progress = intake.progress(Submission.objects.get(pk=sent.pk))
+    progress = progress_of(Submission.objects.get(pk=sent.pk))
     assert (progress.sentence, progress.kept_in) == (text, 1)

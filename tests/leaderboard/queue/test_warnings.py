@@ -14,7 +14,7 @@ from leaderboard.editions import corrections, ground_truth
 from leaderboard.models import Edition, Evaluation, Split, Status, Submission, User
 from leaderboard.queue import worker
 from leaderboard.storage import truth_values
-from leaderboard.submissions import intake
+from leaderboard.submissions.progress import progress_of
 from tests import builders, pages
 from tests.evaluator.toolkit_folders import driving_folder
 
@@ -46,7 +46,7 @@ def scored(owner: User, truth: evaluator.GroundTruth, ttc_s: Floats) -> Submissi
 
 
 def warning_codes(submission: Submission) -> list[str]:
-    progress = intake.progress(submission)
+    progress = progress_of(submission)
     assert progress.state == Status.SCORED
     return [warning["code"] for warning in progress.warnings]
 

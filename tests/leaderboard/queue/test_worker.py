@@ -11,7 +11,7 @@ from leaderboard.editions import ground_truth
 from leaderboard.models import Edition, Evaluation, Score, Status, User
 from leaderboard.queue import worker
 from leaderboard.storage import truth_values
-from leaderboard.submissions import intake
+from leaderboard.submissions.progress import progress_of
 from tests import builders
 
 pytestmark = pytest.mark.slow
@@ -23,7 +23,7 @@ def test_scores_are_the_evaluators_own_with_the_editions_decimals(edition: Editi
     assert worker.run_next(rng=random.Random(0))
     truth = truth_values.load(edition.ground_truth_id)
     offline = evaluate(read_predictions(data, manifest=truth.manifest), truth)
-    progress = intake.progress(submission)
+    progress = progress_of(submission)
     assert progress.state == Status.SCORED
     assert edition.decimals == progress.decimals == 1
     assert progress.scores == {name: rounded(value, decimals=1) for name, value in offline.flat().items()}
@@ -45,7 +45,7 @@ def test_an_empty_interval_has_no_score(benchmark: None, tmp_path, owner: User) 
     ground_truth.import_truth(split_name="test", path=path, now=timezone.now())
     submission = builders.submit(owner, b'{"0": 1.4, "1": 2.4}')
     builders.score_all()
-    scores = intake.progress(submission).scores
+    scores = progress_of(submission).scores
     assert scores is not None
     assert scores["mid"] is not None
     assert scores["mid_negative"] is None
@@ -64,8 +64,8 @@ def test_faulty_file_is_rejected_and_the_next_good_one_scored(
     bad = builders.submit(owner, bad_file, method="Bad")
     good = builders.submit(owner, builders.predictions(edition), method="Good")
     assert builders.score_all() == 2
-    rejected = intake.progress(bad)
+    rejected = progress_of(bad)
     assert (rejected.state, rejected.scores) == (Status.REJECTED, None)
     assert [problem["code"] for problem in rejected.problems] == [code]
-    assert intake.progress(good).state == Status.SCORED
+    assert progress_of(good).state == Status.SCORED
     assert Evaluation.objects.get(submission=bad).attempt == 1

@@ -8,7 +8,7 @@ from pytest_django import Settings
 from leaderboard.models import Edition, Evaluation, Status, User
 from leaderboard.queue import lifecycle
 from leaderboard.quotas.limits import QuotaExceeded
-from leaderboard.submissions import intake
+from leaderboard.submissions.progress import progress_of
 from tests import builders
 from tests.leaderboard.quotas.test_quotas import HOUR, NOW, bad, limit, other, send, state
 from tests.leaderboard.web.maintain import queue_rows
@@ -21,7 +21,7 @@ def test_a_file_that_stops_its_reader_counts_as_rejected_until_a_maintainer_retr
     sent = send(owner, other(edition, 1)).submission
     queue_rows.strike_out()
     assert (state(owner).used, state(owner).n_rejected) == (0, 1)
-    assert intake.progress(sent).sentence.endswith("Until then it counts as a rejected file for 24 hours.")
+    assert progress_of(sent).sentence.endswith("Until then it counts as a rejected file for 24 hours.")
     with pytest.raises(QuotaExceeded, match="or stopped the process that read them"):
         send(owner, other(edition, 2))
     lifecycle.retry(evaluation=Evaluation.objects.get(), actor=maintainer)
@@ -36,7 +36,7 @@ def test_a_machine_that_fails_counts_against_nobody(edition: Edition, owner: Use
         queue_rows.give_back(queue_rows.claim())
     assert Evaluation.objects.get().status == Status.SYSTEM_ERROR
     assert state(owner).n_rejected == 0
-    assert "counts as a rejected" not in intake.progress(sent).sentence
+    assert "counts as a rejected" not in progress_of(sent).sentence
 
 
 def sized(n_bytes: int, number: int) -> bytes:

@@ -19,7 +19,7 @@ from leaderboard.queue.lifecycle import MAX_POISON_STRIKES, Lease
 from leaderboard.queue.worker import Heartbeat
 from leaderboard.sandbox import fork_server
 from leaderboard.storage import files, truth_values
-from leaderboard.submissions import intake
+from leaderboard.submissions.progress import progress_of
 from tests import builders
 from tests.chaos.processes import REPOSITORY
 from tests.chaos.uploads import bomb_file, reader_memory_bytes
@@ -61,13 +61,13 @@ def test_file_that_kills_its_reader_is_tried_again_behind_the_next_and_given_up_
     assert run_next()
     assert strikes(bomb) == (1, 0)
     assert run_next()
-    assert intake.progress(healthy).state == Status.SCORED
+    assert progress_of(healthy).state == Status.SCORED
     assert strikes(bomb) == (1, 0)
     for _ in range(1, MAX_POISON_STRIKES):
         assert run_next()
     assert strikes(bomb) == (MAX_POISON_STRIKES, 0)
-    assert intake.progress(bomb).state == Status.SYSTEM_ERROR
-    assert intake.progress(bomb).fault_is_ours
+    assert progress_of(bomb).state == Status.SYSTEM_ERROR
+    assert progress_of(bomb).fault_is_ours
     assert not run_next()
 
 
@@ -85,9 +85,9 @@ def test_file_that_takes_too_much_processor_time_is_read_once_and_its_team_reads
         assert run_next()
     assert strikes(slow)[0] == 1
     assert not run_next()
-    assert intake.progress(slow).state == Status.SYSTEM_ERROR
-    assert intake.progress(slow).fault_is_ours
-    assert intake.progress(slow).sentence == (
+    assert progress_of(slow).state == Status.SYSTEM_ERROR
+    assert progress_of(slow).fault_is_ours
+    assert progress_of(slow).sentence == (
         "Reading the file took more processor time than a file for this split may take, so it was not "
         "scored; `tsttc check` reads it on your machine without this limit. We keep the file, and a "
         "maintainer can have it read again. Until then it counts as a rejected file for 24 hours."
@@ -144,7 +144,7 @@ def test_fault_of_our_own_is_a_strike_at_once_and_ends_no_worker(
     assert strikes(submission) == (1, 0)
     assert evaluation_of(submission).last_error == "ZeroDivisionError: division by zero"
     assert run_next()
-    assert intake.progress(submission).state == Status.SCORED
+    assert progress_of(submission).state == Status.SCORED
 
 
 def test_outcome_that_the_database_refuses_is_a_strike_and_leaves_nothing(

@@ -1,4 +1,4 @@
-"""`intake.progress`: the place in the queue, and whose fault it was."""
+"""`progress_of`: the position in the queue, and whose fault it was."""
 
 import random
 from datetime import UTC, datetime
@@ -8,8 +8,7 @@ import pytest
 from leaderboard.models import Edition, Evaluation, Status, User
 from leaderboard.queue import lifecycle
 from leaderboard.queue.lifecycle import Strike
-from leaderboard.submissions import intake
-from leaderboard.submissions.intake import Progress
+from leaderboard.submissions.progress import Progress, progress_of
 from tests.leaderboard.web.maintain import queue_rows
 
 NOW = datetime(2026, 11, 21, 12, 0, tzinfo=UTC)
@@ -17,7 +16,7 @@ RNG = random.Random(0)
 
 
 def progress(evaluation: Evaluation) -> Progress:
-    return intake.progress(Evaluation.objects.get(pk=evaluation.pk).submission)
+    return progress_of(Evaluation.objects.get(pk=evaluation.pk).submission)
 
 
 def test_position_counts_those_that_are_claimed_before(edition: Edition, owner: User) -> None:

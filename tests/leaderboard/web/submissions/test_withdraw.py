@@ -8,6 +8,7 @@ from django.utils import timezone
 
 from leaderboard.models import AuditEvent, Edition, Evaluation, Status, Submission, User
 from leaderboard.submissions import intake
+from leaderboard.submissions.progress import progress_of
 from tests import builders, pages
 from tests.editions import changed_on, corrected, extended, open_edition, publish, roll_back
 from tests.leaderboard.web.maintain import queue_rows
@@ -158,4 +159,4 @@ def test_an_edition_in_preparation_says_nothing_of_what_was_withdrawn_under_a_fo
     intake.withdraw(submission=sent, actor=owner, now=timezone.now())
     roll_back()
     sent = Submission.objects.get(pk=sent.pk)
-    assert intake.progress(sent).edition_number == 2
+    assert progress_of(sent).edition_number == 2
