@@ -10,7 +10,7 @@ root=$(git rev-parse --show-toplevel)
 work=$(mktemp -d)
 demo=
 finish() {
-    [ -z "$demo" ] || kill -INT "$demo" 2>/dev/null || true
+    [ -z "$demo" ] || kill -INT -- "-$demo" 2>/dev/null || true # web and worker, too
     wait
     rm -rf "$work"
 }
@@ -52,7 +52,7 @@ for package in "$wheel" "$sdist"; do
 done
 
 note "the demo of $ref"
-(cd "$work/source" && exec make demo PORT="$port") >"$work/demo.log" 2>&1 &
+setsid make -C "$work/source" demo PORT="$port" >"$work/demo.log" 2>&1 &
 demo=$!
 for ((tries = 0; tries < 300; tries++)); do
     curl --silent --fail --output "$work/page.html" "http://127.0.0.1:$port/board/demo/" &&

@@ -41,8 +41,8 @@ def main() -> int:
 
 
 def _pytest(arguments: Sequence[str], **environment: str) -> int:
-    # One process more than processors: browsers, servers and workers are waited for.
-    n_processes = str((os.cpu_count() or 1) + 1)
+    # Two processes more than processors: browsers, servers and workers are waited for.
+    n_processes = str((os.cpu_count() or 1) + 2)
     command = [sys.executable, "-m", "pytest", "-q", "-n", n_processes, *spread.OPTIONS, *arguments]
     return subprocess.run(command, env=os.environ | environment, check=False).returncode
 
