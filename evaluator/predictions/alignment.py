@@ -6,12 +6,13 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Final, Literal, TypeGuard
+from typing import Literal, TypeGuard
 
 import numpy as np
 
 from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap, scale_ratio_to_ttc
-from evaluator.predictions.documents import Document, Members, kind_of, parse, read_document
+from evaluator.predictions.documents import Document, Members, Unit, kind_of, parse, read_document
+from evaluator.predictions.values import RULES, allowed, broken_rule
 from evaluator.problems import Findings, listed, pointer, quoted
 from evaluator.truth.ground_truth import Manifest
 
@@ -20,8 +21,6 @@ PointerOf = Callable[[str], str]
 """The JSON pointer to the member of a name."""
 Fault = Callable[[object], tuple[str, str] | None]
 """Code and message for a value that cannot be taken."""
-
-ZERO_MESSAGE: Final = "The value is 0; expected a time to contact other than 0, negative when moving away."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,19 +39,19 @@ def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
     document = read_document(parse(data, max_members=max_members))
     findings = Findings()
     keys = _check_keys(document.predictions, manifest, findings, document.pointer)
-    ttc = document.unit == "ttc"
-    values = _column(
-        document.predictions, manifest, findings, document.pointer, seconds_fault if ttc else ratio_fault
-    )
-    if not ttc:
+    values = _column(document.predictions, manifest, findings, document.pointer, fault_of(document.unit))
+    if document.unit == "scale_ratio":
         fps_hz = read_rates(document, manifest, findings)
         names = manifest.natural_keys if keys == "natural_key" else manifest.anno_id_keys
         ratios, values = values, scale_ratio_to_ttc(values, fps_hz=fps_hz)
-        for row in np.flatnonzero(values == 0.0).tolist():
-            message = (
-                f"The scale ratio {ratios[row]!s} is a time to contact of 0; expected one that is not 0."
-            )
-            findings.add("zero", message, document.pointer(names[row]))
+        # NaN stands where the ratio or its rate has a fault of its own.
+        for row in np.flatnonzero(~(allowed(values, unit="ttc") | np.isnan(values))).tolist():
+            if rule := broken_rule(values[row], unit="ttc"):
+                message = (
+                    f"The scale ratio {ratios[row]!s} is a time to contact of {values[row]:g}; "
+                    f"expected {rule.expected}."
+                )
+                findings.add(rule.code, message, document.pointer(names[row]))
     findings.raise_if_any()
     return Aligned(document, values, keys)
 
@@ -148,30 +147,18 @@ def column(
     return values
 
 
-def seconds_fault(value: object) -> tuple[str, str] | None:
-    """Code and message for what is no time to contact."""
-    if problem := _number_fault(value, "a number of seconds"):
-        return problem
-    if value == 0:
-        return "zero", ZERO_MESSAGE
-    return None
+def fault_of(unit: Unit) -> Fault:
+    """Code and message for what is no value of this unit."""
+    expected = RULES[unit][0].expected
 
+    def fault(value: object) -> tuple[str, str] | None:
+        if not _is_number(value):
+            return "not-a-number", f"The value is {kind_of(value)}; expected {expected}."
+        # As the columnar reading sees it, a long whole number too.
+        rule = broken_rule(float(value), unit=unit)
+        return (rule.code, rule.message(value)) if rule else None
 
-def ratio_fault(value: object) -> tuple[str, str] | None:
-    """Code and message for what is no scale ratio."""
-    if problem := _number_fault(value, "a scale ratio greater than 0"):
-        return problem
-    if isinstance(value, int | float) and not value > 0:
-        return "not-positive", f"The value is {kind_of(value)}; expected a scale ratio greater than 0."
-    return None
-
-
-def _number_fault(value: object, expected: str) -> tuple[str, str] | None:
-    if not _is_number(value):
-        return "not-a-number", f"The value is {kind_of(value)}; expected {expected}."
-    if value != value:  # noqa: PLR0124 -- NaN alone differs from itself
-        return "nan", f"The value is NaN; expected {expected}."
-    return None
+    return fault
 
 
 def _fps_fault(value: object) -> tuple[str, str] | None:

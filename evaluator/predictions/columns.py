@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
 from evaluator.predictions.alignment import Aligned, KeyKind, read_rates
 from evaluator.predictions.documents import BYTE_ORDER_MARK, Document, Members, parse, read_document
+from evaluator.predictions.values import allowed
 from evaluator.problems import Findings, Rejected
 from evaluator.truth.ground_truth import Manifest
 
@@ -63,11 +64,11 @@ def read_column(data: bytes, manifest: Manifest) -> Aligned | None:
         return None
     values, keys = column
     if document.unit == "scale_ratio":
-        if not values.min() > 0.0:
+        if not allowed(values, unit="scale_ratio").all():
             return None
         values = scale_ratio_to_ttc(values, fps_hz=_rates(document, manifest))
-    # NaN (also from a faulty rate) and 0 are faults; |x| > 0 holds for neither.
-    if not np.abs(values).min() > 0.0:
+    # Also NaN from a faulty rate.
+    if not allowed(values, unit="ttc").all():
         return None
     return Aligned(document, values, keys)
 

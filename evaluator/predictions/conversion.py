@@ -17,18 +17,17 @@ from evaluator.metrics.scale import (
     ttc_to_scale_ratio,
 )
 from evaluator.predictions.alignment import (
-    ZERO_MESSAGE,
     Fault,
     PointerOf,
     column,
+    fault_of,
     rates_of,
-    ratio_fault,
     require_once,
-    seconds_fault,
 )
 from evaluator.predictions.documents import Document, Members, Unit, parse, read_document
 from evaluator.predictions.loading import json_of
 from evaluator.predictions.parquet import as_sent
+from evaluator.predictions.values import broken_rule
 from evaluator.predictions.writing import write_predictions
 from evaluator.problems import Findings, listed, quoted
 
@@ -61,7 +60,7 @@ def convert(
     if natural_keys is not None:
         _require_anno_ids(names, natural_keys, findings, document.pointer)
     is_ratio = document.unit == "scale_ratio" or fps_hz is not None or frame_gap is not None
-    fault = ratio_fault if is_ratio else seconds_fault
+    fault = fault_of("scale_ratio" if is_ratio else "ttc")
     values = column(document.predictions, range(len(names)), findings, document.pointer, fault, n=len(names))
     rates: Floats | None = None
     if document.unit == "scale_ratio":
@@ -102,10 +101,10 @@ def _require_ratios(
         message = (
             f"The time to contact is {value:g} s, which has no scale ratio at {fps_hz:g} Hz: an object that "
             f"moves away needs more than {limit_s:g} s, the time between both frames; {fits}."
-            if value
-            else ZERO_MESSAGE
         )
-        findings.add("not-positive" if value else "zero", message, document.pointer(names[row]))
+        rule = broken_rule(value, unit="ttc")
+        code, message = (rule.code, rule.message(value)) if rule else ("not-positive", message)
+        findings.add(code, message, document.pointer(names[row]))
     findings.raise_if_any()
 
 

@@ -15,7 +15,8 @@ from evaluator.arguments import require
 from evaluator.arrays import in_row_order
 from evaluator.counting import counted
 from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap
-from evaluator.predictions.documents import parse, read_document
+from evaluator.predictions.documents import Unit, parse, read_document
+from evaluator.predictions.values import allowed, broken_rule
 from evaluator.problems import Findings, pointer, quoted
 from evaluator.truth.ground_truth import Manifest
 
@@ -90,15 +91,11 @@ def _names(manifest: Manifest | None, keys: Sequence[str | int] | None, *, n_val
 def require_values(values: Floats, names: Sequence[str], *, is_ratio: bool) -> None:
     """Raise `Rejected` for values that no file may hold, by the names of their sequences."""
     findings = Findings()
-    bad = ~(values > 0) if is_ratio else ~(np.abs(values) > 0)
-    for row in np.flatnonzero(bad).tolist():
-        expected = "a scale ratio greater than 0" if is_ratio else "a time to contact other than 0"
-        code = "nan" if np.isnan(values[row]) else "not-positive" if is_ratio else "zero"
-        findings.add(
-            code,
-            f"The value of {quoted(names[row])} is {values[row]!s}; expected {expected}.",
-            pointer(names[row]),
-        )
+    unit: Unit = "scale_ratio" if is_ratio else "ttc"
+    for row in np.flatnonzero(~allowed(values, unit=unit)).tolist():
+        if rule := broken_rule(values[row], unit=unit):
+            message = f"The value of {quoted(names[row])} is {values[row]!s}; expected {rule.expected}."
+            findings.add(rule.code, message, pointer(names[row]))
     findings.raise_if_any()
 
 

@@ -38,9 +38,9 @@ from evaluator.metrics.protocol import (
 )
 from evaluator.metrics.registry import Terms
 from evaluator.metrics.scale import Floats, scale_ratio_10hz
-from evaluator.predictions.alignment import ZERO_MESSAGE
 from evaluator.predictions.loading import Predictions
 from evaluator.predictions.revisions import realigned
+from evaluator.predictions.values import allowed, broken_rule
 from evaluator.problems import Findings
 from evaluator.scoring.report import Report
 from evaluator.scoring.results import Details, RangeScore, RecordingSums, format_rounded
@@ -157,9 +157,9 @@ class Scorer:
         true_log = truth.ascending_log_scale_ratio
         predicted, n_truncated = _truncate(predictions.ttc_s[truth.ascending_rows], self._protocol)
         alpha = scale_ratio_10hz(predicted)
-        # One comparison each way: NaN fails both, so NaN, 0 (α₁₀ is 0 or -0 there) and undefined MiD end up
-        # here.
-        if not (alpha.min() > 0.0 and alpha.max() < np.inf):
+        # Values that no file may hold may still come from arrays.
+        is_allowed = allowed(predictions.ttc_s, unit="ttc").all()
+        if not (is_allowed and alpha.min() > 0.0 and alpha.max() < np.inf):
             _refuse(predictions, self._protocol)
         terms = Terms(predicted, truth.ascending_ttc_s, alpha, true_log)
         errors = {metric.name: metric.function(terms) for metric in self._protocol.metrics}
@@ -185,12 +185,11 @@ def _refuse(predictions: Predictions, protocol: Protocol) -> NoReturn:
     findings = Findings()
     ttc_s, _ = _truncate(predictions.ttc_s, protocol)
     alpha = scale_ratio_10hz(ttc_s)
-    for row in np.flatnonzero(~((alpha > 0.0) & (alpha < np.inf))).tolist():
+    is_good = allowed(predictions.ttc_s, unit="ttc") & (alpha > 0.0) & (alpha < np.inf)
+    for row in np.flatnonzero(~is_good).tolist():
         value, where = predictions.ttc_s[row], predictions.where(row)
-        if np.isnan(value):
-            findings.add("nan", "The value is NaN; expected a number of seconds.", where)
-        elif value == 0:
-            findings.add("zero", ZERO_MESSAGE, where)
+        if rule := broken_rule(value, unit="ttc"):
+            findings.add(rule.code, rule.message(value), where)
         else:
             message = (
                 f"The value is {value!s} s, where the protocol {protocol.name} has no motion-in-depth error; "

@@ -22,6 +22,7 @@ from evaluator import Manifest, Predictions, Rejected, system_calls
 from evaluator.limits import EXIT_OUT_OF_MEMORY, READY
 from evaluator.predictions.alignment import KeyKind
 from evaluator.predictions.documents import Unit
+from evaluator.predictions.values import allowed
 from leaderboard.sandbox import fork_server
 from leaderboard.sandbox.fork_server import Answer
 
@@ -205,8 +206,8 @@ def _decoded(answer: bytes, *, manifest: Manifest, digest: str) -> Predictions:
     if len(body) != 8 * manifest.n_sequences:
         raise ChildDied(f"reading the file gave {len(body)} bytes where {manifest.n_sequences} values belong")
     ttc_s = np.frombuffer(body, dtype="<f8")
-    if not np.all(np.abs(ttc_s) > 0):
-        raise ChildDied("reading the file gave 0 or NaN, which no file may have")
+    if not allowed(ttc_s, unit="ttc").all():
+        raise ChildDied("reading the file gave a value that no file may have")
     return Predictions(
         manifest=manifest,
         ttc_s=ttc_s,

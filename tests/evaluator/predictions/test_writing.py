@@ -52,12 +52,12 @@ def test_every_value_reads_back_exactly(values: list[float]) -> None:
         (
             {"ttc_s": [1.0, math.nan, 1.0]},
             "nan",
-            'The value of "0" is nan; expected a time to contact other than 0.',
+            'The value of "0" is nan; expected a number of seconds.',
         ),
         (
             {"ttc_s": [1.0, -0.0, 1.0]},
             "zero",
-            'The value of "0" is -0.0; expected a time to contact other than 0.',
+            'The value of "0" is -0.0; expected a time to contact other than 0, negative when moving away.',
         ),
         (
             {"scale_ratio": [1.0, 0.0, 1.0], "fps_hz": 2},

@@ -1,0 +1,65 @@
+"""What a value of a prediction file must be: the one list of rules.
+
+To add a rule, add it to `RULES` and its code to `PROBLEM_CODES`. Both ways of reading, writing, conversion,
+scoring and the leaderboard's check of what a reader says all ask here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator.metrics.scale import Floats
+from evaluator.predictions.documents import Unit, kind_of
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A rule of values: `holds` is asked for one number and elementwise for an array, NaN included.
+
+    `shown` and `expected` are the words of its problem; {} stands for the value.
+    """
+
+    code: str
+    holds: Callable[[Any], Any]
+    expected: str
+    shown: str = "{}"
+
+    def message(self, value: float) -> str:
+        """The problem of this value in a sentence."""
+        return f"The value is {self.shown.format(kind_of(value))}; expected {self.expected}."
+
+
+_RATIO: Final = "a scale ratio greater than 0"
+
+RULES: Final[dict[Unit, tuple[Rule, ...]]] = {
+    "ttc": (
+        # NaN alone differs from itself.
+        Rule("nan", lambda value: value == value, "a number of seconds", "NaN"),  # noqa: PLR0124 -- as above
+        Rule(
+            "zero", lambda value: value != 0, "a time to contact other than 0, negative when moving away", "0"
+        ),
+    ),
+    "scale_ratio": (
+        Rule("nan", lambda value: value == value, _RATIO, "NaN"),  # noqa: PLR0124 -- as above
+        Rule("not-positive", lambda value: value > 0, _RATIO),
+    ),
+}
+"""The rules by unit, in the order in which they are asked; scale ratios are asked again as seconds."""
+
+
+def broken_rule(value: float, *, unit: Unit) -> Rule | None:
+    """The first rule that a value breaks; None where a file may hold it."""
+    return next((rule for rule in RULES[unit] if not rule.holds(value)), None)
+
+
+def allowed(values: Floats, *, unit: Unit) -> NDArray[np.bool_]:
+    """Whether a file may hold each of these values, of their shape."""
+    is_allowed = np.ones(values.shape, dtype=np.bool_)
+    for rule in RULES[unit]:
+        is_allowed &= rule.holds(values)
+    return is_allowed
