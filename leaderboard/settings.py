@@ -202,7 +202,7 @@ FILE_UPLOAD_HANDLERS = ["leaderboard.web.middleware.upload_handlers.UnnamedFileU
 
 # How long after a renaming a team or a method can be renamed again; 0: at once.
 RENAME_AFTER = timedelta(hours=env.float("TSTTC_RENAME_AFTER_H", default=24.0))
-# Whether teams have quotas (see leaderboard/quotas/limits.py).
+# Whether teams have quotas (see leaderboard/quotas/usage.py).
 QUOTAS = env.bool("TSTTC_QUOTAS", default=True)
 # Bytes that a team may send in 24 hours, to all splits together, rejected files included; 0: any number.
 MAX_TEAM_BYTES_PER_DAY = env.int("TSTTC_MAX_TEAM_BYTES_PER_DAY", default=2_000_000_000)

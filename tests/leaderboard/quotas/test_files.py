@@ -7,7 +7,7 @@ from pytest_django import Settings
 
 from leaderboard.models import Edition, Evaluation, Status, User
 from leaderboard.queue import lifecycle
-from leaderboard.quotas.limits import QuotaExceeded
+from leaderboard.quotas.usage import QuotaExceeded
 from leaderboard.submissions.progress import progress_of
 from tests import builders
 from tests.leaderboard.quotas.test_quotas import HOUR, NOW, bad, limit, other, send, state
