@@ -18,7 +18,7 @@ from leaderboard.api import settings
 from leaderboard.ops import environment, logs
 from leaderboard.ops.environment import key_of_checkout, required
 from leaderboard.web.account import allauth_settings
-from leaderboard.web.middleware import frame
+from leaderboard.web.middleware import middleware_order
 
 BASE_DIR = Path(__file__).resolve().parent.parent
 env = environment.env
@@ -80,7 +80,7 @@ INSTALLED_APPS = [
     "knox",
     "rest_framework",
 ]
-MIDDLEWARE = frame.MIDDLEWARE
+MIDDLEWARE = middleware_order.MIDDLEWARE
 ROOT_URLCONF = "leaderboard.urls"
 # The site is at the root of its name. What a request says of another place would be in every link, and in the
 # pages that others are shown from memory.
@@ -372,7 +372,7 @@ METRICS_NETWORKS = environment.networks("TSTTC_METRICS_NETWORKS", default=["127.
 
 # --- security --------------------------------------------------------------------------------------------
 
-CONTENT_SECURITY_POLICY = frame.content_security_policy(SOCIALACCOUNT_PROVIDERS)
+CONTENT_SECURITY_POLICY = middleware_order.content_security_policy(SOCIALACCOUNT_PROVIDERS)
 X_FRAME_OPTIONS = "DENY"
 SECURE_CONTENT_TYPE_NOSNIFF = True
 SECURE_REFERRER_POLICY = "same-origin"
