@@ -18,7 +18,7 @@ from leaderboard.api import settings
 from leaderboard.ops import environment, logs
 from leaderboard.ops.environment import key_of_checkout, required
 from leaderboard.web.account import allauth_settings
-from leaderboard.web.middleware import frame
+from leaderboard.web.middleware import middleware_order
 
 BASE_DIR = Path(__file__).resolve().parent.parent
 env = environment.env
@@ -80,7 +80,7 @@ INSTALLED_APPS = [
     "knox",
     "rest_framework",
 ]
-MIDDLEWARE = frame.MIDDLEWARE
+MIDDLEWARE = middleware_order.MIDDLEWARE
 ROOT_URLCONF = "leaderboard.urls"
 # The site is at the root of its name. What a request says of another place would be in every link, and in the
 # pages that others are shown from memory.
@@ -202,7 +202,7 @@ FILE_UPLOAD_HANDLERS = ["leaderboard.web.middleware.upload_handlers.UnnamedFileU
 
 # How long after a renaming a team or a method can be renamed again; 0: at once.
 RENAME_AFTER = timedelta(hours=env.float("TSTTC_RENAME_AFTER_H", default=24.0))
-# Whether teams have quotas (see leaderboard/quotas/limits.py).
+# Whether teams have quotas (see leaderboard/quotas/usage.py).
 QUOTAS = env.bool("TSTTC_QUOTAS", default=True)
 # Bytes that a team may send in 24 hours, to all splits together, rejected files included; 0: any number.
 MAX_TEAM_BYTES_PER_DAY = env.int("TSTTC_MAX_TEAM_BYTES_PER_DAY", default=2_000_000_000)
@@ -372,7 +372,7 @@ METRICS_NETWORKS = environment.networks("TSTTC_METRICS_NETWORKS", default=["127.
 
 # --- security --------------------------------------------------------------------------------------------
 
-CONTENT_SECURITY_POLICY = frame.content_security_policy(SOCIALACCOUNT_PROVIDERS)
+CONTENT_SECURITY_POLICY = middleware_order.content_security_policy(SOCIALACCOUNT_PROVIDERS)
 X_FRAME_OPTIONS = "DENY"
 SECURE_CONTENT_TYPE_NOSNIFF = True
 SECURE_REFERRER_POLICY = "same-origin"

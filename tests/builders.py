@@ -18,7 +18,7 @@ from leaderboard.methods import visibility as visibility_verbs
 from leaderboard.models import Edition, PublishedResult, QuotaOverride, Split, Submission, Team, User
 from leaderboard.people import tokens
 from leaderboard.queue import worker
-from leaderboard.quotas import limits
+from leaderboard.quotas import usage
 from leaderboard.storage import truth_values
 from leaderboard.submissions import intake
 from leaderboard.upkeep import backlog
@@ -90,7 +90,7 @@ def override(team: Team, *, split: str = "test", **options: Any) -> QuotaOverrid
     rules = {"limit": None, "window": timedelta(days=1), "min_gap": timedelta(0), "rejected_limit": None}
     row = Split.objects.get(pk=split)
     audit_fields = {"reason": "R", "actor": None, "now": timezone.now()}
-    return limits.override(team=team, split=row, **{**rules, **audit_fields, **options})
+    return usage.override(team=team, split=row, **{**rules, **audit_fields, **options})
 
 
 def quote(name: str, scores: dict[str, float]) -> PublishedResult:

@@ -17,7 +17,7 @@ from leaderboard.boards import filters, listing
 from leaderboard.errors import outages, problem_codes
 from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.ops import rate_limits
-from leaderboard.quotas import limits
+from leaderboard.quotas import usage
 from leaderboard.statistics import comparisons, questions
 
 UNAUTHORIZED = (exceptions.NotAuthenticated, exceptions.AuthenticationFailed, exceptions.PermissionDenied)
@@ -100,7 +100,7 @@ def _domain_error(exc: Exception) -> Response | None:
         case Refused():
             status = REFUSED_STATUS.get(exc.code, 422)
             return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
-        case limits.QuotaExceeded() | questions.AskedTooOften():
+        case usage.QuotaExceeded() | questions.AskedTooOften():
             return _not_yet(exc)
         case filters.BadFilter():
             return problem(status=400, code="bad-filter", detail=str(exc), where=exc.field)
@@ -110,8 +110,8 @@ def _domain_error(exc: Exception) -> Response | None:
     return problem(status=status, code=code, detail=str(exc), where=where)
 
 
-def _not_yet(exc: limits.QuotaExceeded | questions.AskedTooOften) -> Response:
-    if isinstance(exc, limits.QuotaExceeded):
+def _not_yet(exc: usage.QuotaExceeded | questions.AskedTooOften) -> Response:
+    if isinstance(exc, usage.QuotaExceeded):
         retry_after_s = exc.quota.retry_after_s(now=timezone.now())
     else:
         retry_after_s = exc.retry_after_s

@@ -26,7 +26,7 @@ from leaderboard.methods import details
 from leaderboard.methods.details import Details
 from leaderboard.models import Split, Visibility
 from leaderboard.quotas import admissions
-from leaderboard.quotas.limits import Quota
+from leaderboard.quotas.usage import Quota
 
 SPLIT: Final = "Name of the split."
 EDITION: Final = "Number of the edition."

@@ -27,7 +27,7 @@ from leaderboard.api.throttling import SubmitThrottle
 from leaderboard.api.views import visible
 from leaderboard.methods import editing
 from leaderboard.models import Evaluation, Submission, User
-from leaderboard.quotas import limits
+from leaderboard.quotas import usage
 from leaderboard.submissions import intake, outcomes
 
 DETAIL_FIELDS = ("description", "paper_url", "code_url")
@@ -60,9 +60,7 @@ class SubmissionsView(APIView):
         now = timezone.now()
         answer = intake.submit(_submission_request(request, form, now=now))
         made = answer.submission
-        quota = limits.state(
-            team=made.method.team, user=cast("User", request.user), split=made.split, now=now
-        )
+        quota = usage.state(team=made.method.team, user=cast("User", request.user), split=made.split, now=now)
         (outcome,) = outcomes.for_submissions([made], now=now)
         return Response(
             SubmittedSerializer(outcome, context={"quota": quota}).data,

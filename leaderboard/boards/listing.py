@@ -25,7 +25,7 @@ from leaderboard.boards.rows import (
     named,
     profile_of,
     public_reason,
-    published_entry,
+    quoted_entry,
     ranges_in,
     scored_in,
     submitted_entry,
@@ -208,7 +208,7 @@ def public_rows(
     `assuming_visible` is a method with a visibility that it does not have yet: the rows would be these then.
     """
     quoted = PublishedResult.objects.on_board(split, edition, at=at)
-    entries = [published_entry(result, rules=rules_of(edition)) for result in quoted]
+    entries = [quoted_entry(result, rules=rules_of(edition)) for result in quoted]
     if edition is not None:
         shown = Method.objects.shown(at=at)
         if assuming_visible is not None:

@@ -139,7 +139,7 @@ def profile_of(method: Method, *, is_masked: bool = False) -> Profile:
     )
 
 
-def published_entry(result: PublishedResult, *, rules: Protocol) -> Entry:
+def quoted_entry(result: PublishedResult, *, rules: Protocol) -> Entry:
     """The row of a result that is printed in a paper, on a board of this protocol."""
     return Entry(
         kind="published",

@@ -202,7 +202,9 @@ def run(
         try:
             outcome = _outcome(
                 evaluation,
-                heartbeat=Heartbeat(lease, waiting=waiting, lease_s=settings.LEASE_S, wall_s=settings.WALL_S),
+                heartbeat=Heartbeat(
+                    lease, waiting=waiting, lease_s=settings.LEASE_S, wall_s=settings.WALL_S
+                ).beat,
             )
             _retry_on_disconnect(lambda: lifecycle.finalise(lease, outcome))
         except LostRace as race:
@@ -222,7 +224,7 @@ def run(
 
 
 class Heartbeat:
-    """The heartbeat of one run: False once another worker has the work, or its time is up.
+    """The heartbeat of one run.
 
     A database that does not answer says neither. A run with a heartbeat keeps nothing waiting behind it.
     """
@@ -233,8 +235,8 @@ class Heartbeat:
         self._lease_s = lease_s
         self._ends_s = time.monotonic() + wall_s
 
-    def __call__(self) -> bool:
-        """Renew the lease."""
+    def beat(self) -> bool:
+        """Renew the lease. False once another worker has the work, or its time is up."""
         if time.monotonic() >= self._ends_s:
             return False
         try:

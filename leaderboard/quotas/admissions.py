@@ -8,7 +8,7 @@ from django.db import transaction
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Admission, Split, Team, User
-from leaderboard.quotas import limits
+from leaderboard.quotas import usage
 
 
 def refusal_of(*, team: Team | None, split: Split) -> Refused | None:
@@ -40,7 +40,7 @@ def admit(*, team: Team, split: Split, reason: str, actor: User | None, now: dat
     require_maintainer(actor, to="admit teams")
     with transaction.atomic():
         # Before the row that names it: whoever ends the team holds it.
-        if not limits.lock(team=team):
+        if not usage.lock(team=team):
             raise Team.DoesNotExist(
                 f"The team {team.name!r} was deleted a moment ago; expected an existing team."
             )
@@ -95,9 +95,9 @@ def closing_of(split: Split) -> str:
     return f"Submissions to {split.pk} close at {at:%Y-%m-%d %H:%M} UTC." if at else ""
 
 
-def left(*, team: Team | None, user: User, split: Split, now: datetime) -> limits.Quota:
+def left(*, team: Team | None, user: User, split: Split, now: datetime) -> usage.Quota:
     """What the team has left on the split; none of it can be had while the split takes nothing from it."""
-    quota = limits.state(team=team, user=user, split=split, now=now)
+    quota = usage.state(team=team, user=user, split=split, now=now)
     refusal = refusal_for_all(split, now=now)
     not_admitted = refusal_of(team=team, split=split)
     if refusal is None and not_admitted is not None:

@@ -19,7 +19,7 @@ from leaderboard.models import Method, SentFile, Split, Submission, Team, User
 from leaderboard.people import teams
 from leaderboard.people.names import clean_name
 from leaderboard.queue import lifecycle
-from leaderboard.quotas import admissions, limits
+from leaderboard.quotas import admissions, usage
 from leaderboard.storage import files, orphans
 
 log = structlog.get_logger(__name__)
@@ -78,7 +78,7 @@ def submit(request: SubmissionRequest) -> Submitted:
 
     The same bytes again, for the same split, method and manifest, are answered with the first submission and
     change nothing. Details that differ from the method's own replace them; without `may_edit` they are
-    refused. Raises `Refused` or `limits.QuotaExceeded` (nothing is kept then).
+    refused. Raises `Refused` or `usage.QuotaExceeded` (nothing is kept then).
     """
     split = _open_split(request.split_name, now=request.now)
     request = request.cleaned()
@@ -89,7 +89,7 @@ def submit(request: SubmissionRequest) -> Submitted:
     if answers.sent_before is not None:
         return Submitted(submission=answers.sent_before, is_new=False)
     files.save_predictions(upload, measured=file, now=request.now)
-    with orphans.unless_refused(Refused, limits.QuotaExceeded, digest=file.digest), transaction.atomic():
+    with orphans.unless_refused(Refused, usage.QuotaExceeded, digest=file.digest), transaction.atomic():
         orphans.lock(file.digest)
         files.require_unchanged(upload, digest=file.digest)
         submitted = _record(request, file, split=split)
@@ -119,14 +119,14 @@ def _answers(
     """Ask what decides on a file, in this order: admission, same bytes, quota, changes, name.
 
     Asked twice: before the bytes are written, to spare the disk, and with split and team locked, for certain.
-    Raises `Refused` or `limits.QuotaExceeded`.
+    Raises `Refused` or `usage.QuotaExceeded`.
     """
     admissions.require(team=team, split=split)
     method = Method.objects.existing().filter(team=team, name=request.method_name).first()
     sent_before = _sent_before(file, split=split, method=method) if method else None
     if sent_before is not None:
         return _Answers(method, sent_before, {})
-    limits.require(team=team, user=request.user, split=split, size_bytes=file.size_bytes, now=request.now)
+    usage.require(team=team, user=request.user, split=split, size_bytes=file.size_bytes, now=request.now)
     changes = request.changes_of(method)
     if method is None and team is not None:
         # Without the lock another request may be making this very method, which is no other name.
@@ -135,7 +135,7 @@ def _answers(
 
 
 def _record(request: SubmissionRequest, file: files.StoredFile, *, split: Split) -> Submitted:
-    """Write the rows of a stored file and queue it. Raises `Refused` or `limits.QuotaExceeded`."""
+    """Write the rows of a stored file and queue it. Raises `Refused` or `usage.QuotaExceeded`."""
     # From here on the board stays, so the file is queued in an edition with the manifest that its row names.
     split = Split.objects.select_related("published_edition__ground_truth").lock_shared(split.pk)
     team = _locked_team(request.user)
@@ -167,9 +167,9 @@ def _record(request: SubmissionRequest, file: files.StoredFile, *, split: Split)
 
 def _locked_team(user: User) -> Team:
     """The person's team, new if there is none, locked until the transaction ends."""
-    limits.hold_accounts(user=user)
+    usage.hold_accounts(user=user)
     team = teams.team_of(user=user)
-    limits.lock(team=team)
+    usage.lock(team=team)
     teams.require_member(team, user)
     return team
 

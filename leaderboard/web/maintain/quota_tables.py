@@ -9,7 +9,7 @@ from leaderboard.models import Split, Team, User
 from leaderboard.models.quotas import QuotaRules
 from leaderboard.moderation import forgetting
 from leaderboard.people import names
-from leaderboard.quotas import limits
+from leaderboard.quotas import usage
 from leaderboard.quotas.spans import span
 from leaderboard.web.formatting import grouped
 
@@ -58,7 +58,7 @@ def team_rows(team: Team, *, viewer: User, now: datetime) -> list[dict[str, Any]
             "split": split,
             "own": own.get(split.pk),
             "rules": rules_of(own.get(split.pk, split)),
-            "quota": limits.state(team=team, user=viewer, split=split, now=now),
+            "quota": usage.state(team=team, user=viewer, split=split, now=now),
             "admission": admitted.get(split.pk),
         }
         for split in Split.objects.all()

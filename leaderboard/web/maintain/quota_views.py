@@ -11,7 +11,7 @@ from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from leaderboard.models import Admission, QuotaOverride, Split, Team
-from leaderboard.quotas import admissions, limits
+from leaderboard.quotas import admissions, usage
 from leaderboard.web.maintain import quota_tables
 from leaderboard.web.maintain.maintainer_views import (
     form_page,
@@ -67,7 +67,7 @@ def override(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
     if form.is_valid():
         actor, now = maintainer_of(request), timezone.now()
         try:
-            limits.override(team=team, split=split_row, actor=actor, now=now, **form.rules())
+            usage.override(team=team, split=split_row, actor=actor, now=now, **form.rules())
         except Team.DoesNotExist:
             raise Http404 from None  # it has just ended
         messages.success(request, f"{team.name} now has an override on {split}.")
@@ -84,7 +84,7 @@ def end_override(request: HttpRequest, team_id: UUID, split: str) -> HttpRespons
     own = get_object_or_404(rows, team=team_id, split=split)
     form = EndForm.asked(request)
     if form.is_valid():
-        limits.end_override(row=own, actor=maintainer_of(request), **form.cleaned_data)
+        usage.end_override(row=own, actor=maintainer_of(request), **form.cleaned_data)
         messages.success(request, f"The rules of {split} hold for {own.team.name} again.")
         return redirect("maintain_team_quotas", team_id)
     lead = "The rules of the split apply to the team again from the next submission."
@@ -135,7 +135,7 @@ def _form(
     own: QuotaOverride | None,
     words: dict[str, str],
 ) -> HttpResponse:
-    quota = limits.state(team=team, user=maintainer_of(request), split=split, now=timezone.now())
+    quota = usage.state(team=team, user=maintainer_of(request), split=split, now=timezone.now())
     about = {
         "team": team,
         "split": split,

@@ -16,7 +16,7 @@ from evaluator.predictions.documents import EMPTY_MESSAGE
 from leaderboard.methods import visibility
 from leaderboard.models import Method, Split, Submission, User
 from leaderboard.people import teams
-from leaderboard.quotas import admissions, limits
+from leaderboard.quotas import admissions, usage
 from leaderboard.submissions import search
 from leaderboard.submissions.intake import SubmissionRequest
 from leaderboard.web.methods.method_forms import DetailsForm
@@ -39,7 +39,7 @@ def offers_for(user: User, *, now: datetime) -> list[SplitChoice]:
     for split in Split.objects.shown().select_related("published_edition__ground_truth"):
         refusal = admissions.refusal_for_all(split, now=now) or admissions.refusal_of(team=team, split=split)
         if refusal is None:
-            quota = limits.state(team=team, user=user, split=split, now=now)
+            quota = usage.state(team=team, user=user, split=split, now=now)
             sentence = f"{quota.sentence} {admissions.closing_of(split)}".strip()
         else:
             sentence = str(refusal)

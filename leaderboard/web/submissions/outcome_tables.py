@@ -12,7 +12,7 @@ from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import Entry
 from leaderboard.exports import tables
 from leaderboard.models import Submission, Visibility
-from leaderboard.quotas.limits import Quota
+from leaderboard.quotas.usage import Quota
 from leaderboard.submissions import outcomes
 from leaderboard.submissions.outcomes import BoardPosition
 from leaderboard.submissions.progress import Progress

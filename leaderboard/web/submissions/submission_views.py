@@ -24,7 +24,7 @@ from evaluator.predictions import writing
 from leaderboard.editions import history
 from leaderboard.http_caching import is_known
 from leaderboard.models import Evaluation, Status, Submission, User, Visibility
-from leaderboard.quotas import limits
+from leaderboard.quotas import usage
 from leaderboard.statistics import analyses
 from leaderboard.storage import manifests
 from leaderboard.submissions import intake, outcomes, receipts, search
@@ -36,7 +36,7 @@ from leaderboard.web.lookups import split_or_404
 from leaderboard.web.methods import result_tables
 from leaderboard.web.submissions import outcome_tables
 from leaderboard.web.submissions.forms import SearchForm, SubmissionForm
-from leaderboard.web.submissions.progress import StateLine, state_line
+from leaderboard.web.submissions.status_line import StateLine, state_line
 
 PER_PAGE = 50
 # htmx takes this as "do not ask again".
@@ -51,7 +51,7 @@ def submit(request: HttpRequest) -> HttpResponse:
     if request.method == "POST" and form.is_valid():
         try:
             submitted = intake.submit(form.submission_request(now=timezone.now()))
-        except (intake.Refused, limits.QuotaExceeded) as refusal:
+        except (intake.Refused, usage.QuotaExceeded) as refusal:
             form.refuse(refusal)
         else:
             if not submitted.is_new:
@@ -153,7 +153,7 @@ def _outcome(request: HttpRequest, row: Submission, progress: Progress) -> dict[
     rescored = edition_tables.rescored_notice(history.rescored(row))
     quota = None
     if progress.state == Status.REJECTED and rescored is None:
-        quota = limits.state(team=row.method.team, user=row.submitted_by, split=row.split, now=now)
+        quota = usage.state(team=row.method.team, user=row.submitted_by, split=row.split, now=now)
     return {
         "submission": row,
         "progress": progress,

@@ -25,7 +25,7 @@ from leaderboard.models import (
     Visibility,
 )
 from leaderboard.people import invitations, teams, tokens
-from leaderboard.quotas import limits
+from leaderboard.quotas import usage
 from tests import builders
 from tests.services import ON_POSTGRESQL, crowd_on_postgres
 
@@ -75,7 +75,7 @@ def test_twenty_submissions_at_once_take_exactly_the_five_slots_there_are(
     def submit(number: int) -> bool:
         try:
             return builders.send(owner, data[number]).is_new
-        except limits.QuotaExceeded:
+        except usage.QuotaExceeded:
             return False
 
     assert sum(at_once(20, submit)) == 5
@@ -190,7 +190,7 @@ def test_leaving_while_sending_gives_nobody_another_slot(edition: Edition, owner
                 teams.leave(user=owner)
             else:
                 builders.submit(owner, data[number], method=f"M{number}")
-        except (Refused, limits.QuotaExceeded):
+        except (Refused, usage.QuotaExceeded):
             return
 
     at_once(20, go_on)

@@ -10,8 +10,8 @@ from django.utils import timezone
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, Publication, Split, Status, Submission, User
 from leaderboard.people import teams
-from leaderboard.quotas import limits
-from leaderboard.quotas.limits import Quota
+from leaderboard.quotas import usage
+from leaderboard.quotas.usage import Quota
 from leaderboard.submissions.progress import progress_of
 from tests import builders
 from tests.editions import extended, open_edition, publish, roll_back
@@ -41,7 +41,7 @@ def adding(sent: Submission, tmp_path: Path) -> Edition:
 def left(user: User) -> Quota:
     Split.objects.update(quota_limit=3, quota_window=timedelta(days=30), quota_min_gap=timedelta(days=1))
     split = Split.objects.get(pk="test")
-    return limits.state(team=teams.team_of(user=user), user=user, split=split, now=timezone.now())
+    return usage.state(team=teams.team_of(user=user), user=user, split=split, now=timezone.now())
 
 
 def test_publishing_is_refused_by_every_door_until_the_entries_are_left_out_knowingly(

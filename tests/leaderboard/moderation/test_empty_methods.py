@@ -9,7 +9,7 @@ from leaderboard.errors.refusals import Refused
 from leaderboard.models import AuditEvent, Edition, Method, Submission, User
 from leaderboard.moderation import empty_methods
 from leaderboard.people import invitations, teams
-from leaderboard.quotas import limits
+from leaderboard.quotas import usage
 from tests import builders, pages
 
 
@@ -38,7 +38,7 @@ def test_the_method_of_a_broken_upload_is_deleted_its_file_stays_and_its_name_is
     assert audit.names_in([event]) == {event.details["name"]: "Broken Net"}
     again = builders.submit(owner, builders.predictions(edition), method="Broken-Net")
     assert again.method_id != rejected.method_id
-    state = limits.state(team=again.method.team, user=owner, split=edition.split, now=timezone.now())
+    state = usage.state(team=again.method.team, user=owner, split=edition.split, now=timezone.now())
     assert state.n_rejected == 1, "a deletion gives no rejection back"
 
 

@@ -7,10 +7,10 @@ from pytest_django import Settings
 
 from leaderboard.models import Edition, Evaluation, Status, User
 from leaderboard.queue import lifecycle
-from leaderboard.quotas.limits import QuotaExceeded
+from leaderboard.quotas.usage import QuotaExceeded
 from leaderboard.submissions.progress import progress_of
 from tests import builders
-from tests.leaderboard.quotas.test_quotas import HOUR, NOW, bad, limit, other, send, state
+from tests.leaderboard.quotas.test_usage import HOUR, NOW, bad, limit, other, send, state
 from tests.leaderboard.web.maintain import queue_rows
 
 

@@ -11,8 +11,8 @@ from pytest_django.fixtures import Settings
 from leaderboard.models import Edition, SpentMailbox, Split, Submission, User
 from leaderboard.moderation import forgetting
 from leaderboard.people import teams
-from leaderboard.quotas import limits
-from leaderboard.quotas.limits import QuotaExceeded
+from leaderboard.quotas import usage
+from leaderboard.quotas.usage import QuotaExceeded
 from leaderboard.upkeep import pollers
 from tests import builders
 from tests.leaderboard.web.account import proving
@@ -52,7 +52,7 @@ def forget(user: User) -> None:
 def left(user: User) -> int | None:
     split = Split.objects.get(pk="test")
     team = teams.current_team_of(user=user)
-    return limits.state(team=team, user=user, split=split, now=timezone.now()).left
+    return usage.state(team=team, user=user, split=split, now=timezone.now()).left
 
 
 # --- the attack ---------------------------------------------------------------------------------------------

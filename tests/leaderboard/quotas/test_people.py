@@ -8,8 +8,8 @@ from pytest_django.fixtures import Settings
 
 from leaderboard.models import Edition, Method, Split, User
 from leaderboard.people import invitations, teams
-from leaderboard.quotas import limits
-from leaderboard.quotas.limits import Quota, QuotaExceeded
+from leaderboard.quotas import usage
+from leaderboard.quotas.usage import Quota, QuotaExceeded
 from tests import builders
 
 pytestmark = pytest.mark.slow
@@ -26,7 +26,7 @@ def limited(edition: Edition) -> Edition:
 
 def state(user: User) -> Quota:
     split = Split.objects.get(pk="test")
-    return limits.state(team=teams.current_team_of(user=user), user=user, split=split, now=timezone.now())
+    return usage.state(team=teams.current_team_of(user=user), user=user, split=split, now=timezone.now())
 
 
 def send(edition: Edition, user: User, *factors: float) -> None:

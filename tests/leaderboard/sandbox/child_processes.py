@@ -11,7 +11,7 @@ needs_root = pytest.mark.skipif(
     os.geteuid() != 0, reason="the environment and the descriptors of a reader are shown to root alone"
 )
 
-READERS = ("evaluator.predictions.reader", "evaluator.truth.annotation_child")
+READERS = {"evaluator.predictions.reader", "evaluator.truth.annotation_child"}
 FORK_SERVER = "evaluator.predictions.reader_server"
 
 
@@ -21,7 +21,7 @@ def children() -> set[int]:
     Other tests of the same run have children as well, such as the driver of a browser.
     """
     pids = children_of("self")
-    readers = {pid for pid in pids if any(module in kernel_says(pid, "cmdline") for module in READERS)}
+    readers = {pid for pid in pids if READERS & set(kernel_says(pid, "cmdline").split("\0"))}
     return readers.union(*map(children_of, fork_servers()))
 
 

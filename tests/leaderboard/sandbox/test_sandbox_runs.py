@@ -194,19 +194,19 @@ def test_database_that_is_away_ends_no_run(
     def away(*_: object, **__: object) -> bool:
         raise fault("the server closed the connection unexpectedly")
 
-    pulse = Heartbeat(leases[0], waiting=deque(), lease_s=LEASE_S, wall_s=WALL_S)
+    heartbeat = Heartbeat(leases[0], waiting=deque(), lease_s=LEASE_S, wall_s=WALL_S)
     monkeypatch.setattr(lifecycle, "heartbeat", away)
     monkeypatch.setattr(worker.connection, "close", lambda: None)
-    assert pulse()
+    assert heartbeat.beat()
 
 
 def test_run_ends_by_its_own_clock_where_the_database_cannot_say_so(leases: list[Lease]) -> None:
-    assert not Heartbeat(leases[0], waiting=deque(), lease_s=LEASE_S, wall_s=0.0)()
+    assert not Heartbeat(leases[0], waiting=deque(), lease_s=LEASE_S, wall_s=0.0).beat()
 
 
 def test_what_waits_behind_a_long_run_is_handed_back(leases: list[Lease]) -> None:
     waiting = deque(leases[1:])
-    assert Heartbeat(leases[0], waiting=waiting, lease_s=LEASE_S, wall_s=WALL_S)()
+    assert Heartbeat(leases[0], waiting=waiting, lease_s=LEASE_S, wall_s=WALL_S).beat()
     assert not waiting
     assert [queue_rows.row(lease).status for lease in leases] == [
         Status.RUNNING,

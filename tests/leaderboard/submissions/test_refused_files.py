@@ -15,7 +15,7 @@ from django.db import connection
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, Split, Submission, User
 from leaderboard.people import teams
-from leaderboard.quotas import limits
+from leaderboard.quotas import usage
 from leaderboard.storage import files
 from tests import builders
 from tests.interlocking import meet
@@ -65,7 +65,7 @@ def test_a_file_whose_slot_was_taken_meanwhile_is_not_kept(
 ) -> None:
     one_slot()
     upload = Meanwhile(DATA, lambda: builders.send(owner, file_of(b"first")))
-    with pytest.raises(limits.QuotaExceeded):
+    with pytest.raises(usage.QuotaExceeded):
         builders.send(owner, upload)
     [first] = Submission.objects.all()
     assert stored(tmp_path) == [first.digest]
@@ -78,7 +78,7 @@ def test_a_refused_file_that_a_submission_names_stays(
     theirs = builders.send(stranger, file_of(DATA)).submission
     age(DATA)
     upload = Meanwhile(DATA, lambda: builders.send(owner, file_of(b"first")))
-    with pytest.raises(limits.QuotaExceeded):
+    with pytest.raises(usage.QuotaExceeded):
         builders.send(owner, upload)
     assert theirs.digest in stored(tmp_path)
 
@@ -112,7 +112,7 @@ def test_a_store_that_does_not_answer_does_not_hide_the_refusal(
         raise files.StoreAway("away")
 
     monkeypatch.setattr(files.DurableFileSystemStorage, "delete", fail)
-    with pytest.raises(limits.QuotaExceeded):
+    with pytest.raises(usage.QuotaExceeded):
         builders.send(owner, upload)
     assert len(stored(tmp_path)) == 2, "the cleaning finds it in a day"
 
@@ -134,7 +134,7 @@ class TestAtOnce:
         def sent(number: int) -> bool:
             try:
                 return builders.send(owner, file_of(random.Random(number).randbytes(1000))).is_new
-            except limits.QuotaExceeded:
+            except usage.QuotaExceeded:
                 return False
 
         assert sum(at_once(12, sent)) == 1

@@ -25,7 +25,7 @@ from leaderboard.models import User
 from leaderboard.moderation import forgetting
 from leaderboard.ops import environment
 from leaderboard.web.account import providers
-from leaderboard.web.middleware import frame
+from leaderboard.web.middleware import middleware_order
 from tests.leaderboard.web.account.oauth_server import CODE, HANGS, IID, TOKEN, Provider, lead_to, running
 from tests.leaderboard.web.account.proving import proving
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -52,7 +52,9 @@ def provider(server: Provider, db: None, settings: Settings, monkeypatch: pytest
         orcid=("ORCID", "TSTTC_ORCID_CLIENT_ID", "TSTTC_ORCID_CLIENT_SECRET"),
         github=("GitHub", "TSTTC_GITHUB_CLIENT_ID", "TSTTC_GITHUB_CLIENT_SECRET"),
     )
-    settings.CONTENT_SECURITY_POLICY = frame.content_security_policy(settings.SOCIALACCOUNT_PROVIDERS)
+    settings.CONTENT_SECURITY_POLICY = middleware_order.content_security_policy(
+        settings.SOCIALACCOUNT_PROVIDERS
+    )
     proving(settings)
     addresses = ModuleType("urls_with_providers")
     addresses.urlpatterns = [*urls.urlpatterns, path("accounts/", include(providers.patterns()))]  # type: ignore[attr-defined]

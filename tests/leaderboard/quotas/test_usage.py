@@ -23,8 +23,8 @@ from leaderboard.models import (
     User,
 )
 from leaderboard.people import teams
-from leaderboard.quotas import limits
-from leaderboard.quotas.limits import Quota, QuotaExceeded
+from leaderboard.quotas import usage
+from leaderboard.quotas.usage import Quota, QuotaExceeded
 from leaderboard.submissions import intake
 from tests import builders
 
@@ -54,7 +54,7 @@ def bad(number: int) -> bytes:
 
 def state(user: User, *, at: datetime = NOW, split: str = "test") -> Quota:
     row = Split.objects.get(pk=split)
-    return limits.state(team=teams.current_team_of(user=user), user=user, split=row, now=at)
+    return usage.state(team=teams.current_team_of(user=user), user=user, split=row, now=at)
 
 
 # --- the rules of the benchmark --------------------------------------------------------------------------
@@ -227,7 +227,7 @@ def test_a_team_can_have_rules_of_its_own_with_a_reason(
     event = AuditEvent.objects.get(verb="quota_overridden", actor=maintainer)
     details = {name: event.details[name] for name in ("split", "quota_limit", "reason")}
     assert details == {"split": "test", "quota_limit": 2, "reason": reason}
-    limits.end_override(row=row, actor=maintainer)
+    usage.end_override(row=row, actor=maintainer)
     assert state(owner).left == 0
     assert AuditEvent.objects.filter(verb="quota_restored", noun_id=row.team_id).count() == 1
 
@@ -252,7 +252,7 @@ def test_the_next_slot_opens_exactly_when_the_quota_says(
     split = Split(name="test")
 
     def weighed(at: datetime) -> Quota:
-        return limits.weigh(split=split, rules=rules, spent=sorted(spent), rejected=sorted(rejected), now=at)
+        return usage.weigh(split=split, rules=rules, spent=sorted(spent), rejected=sorted(rejected), now=at)
 
     quota = weighed(now)
     if quota.is_open:
