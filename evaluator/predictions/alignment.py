@@ -47,9 +47,10 @@ def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
         # NaN stands where the ratio or its rate has a fault of its own.
         for row in np.flatnonzero(~(allowed(values, unit="ttc") | np.isnan(values))).tolist():
             if rule := broken_rule(values[row], unit="ttc"):
+                expected = rule.expected if values[row] else "one that is not 0"
                 message = (
                     f"The scale ratio {ratios[row]!s} is a time to contact of {values[row]:g}; "
-                    f"expected {rule.expected}."
+                    f"expected {expected}."
                 )
                 findings.add(rule.code, message, document.pointer(names[row]))
     findings.raise_if_any()
