@@ -99,7 +99,7 @@ def _is_span(span: timedelta, *, is_none_allowed: bool) -> bool:
 
 
 class QuotaOverride(QuotaRules):
-    """The rules of one team on one split, instead of the split's own. Written by `quotas.quotas`."""
+    """The rules of one team on one split, instead of the split's own. Written by `quotas.usage`."""
 
     team = models.ForeignKey(Team, on_delete=models.CASCADE, related_name="quota_overrides")
     split = models.ForeignKey("Split", on_delete=models.CASCADE, related_name="quota_overrides")

@@ -15,14 +15,14 @@ class SweepBeat(models.Model):
         default=0, help_text="What waited for a ground truth that the sweeping worker cannot read."
     )
 
-    # When a worker last began to sweep, to clean, and to send mails; see `workers.queue`.
+    # When a worker last began to sweep, to clean, and to send mails; see `upkeep.pollers`.
     sweep_begun_at = models.DateTimeField(null=True, blank=True)
     clean_begun_at = models.DateTimeField(null=True, blank=True)
     mails_begun_at = models.DateTimeField(null=True, blank=True)
     # Until when everything that people are told by mail is queued; see `mails.notices`.
     notices_at = models.DateTimeField(null=True, blank=True)
 
-    # What was removed because no submission named it, since the beginning; see `workers.queue`.
+    # What was removed because no submission named it, since the beginning; see `upkeep.pollers`.
     cleaned_at = models.DateTimeField(null=True, blank=True)
 
     class Meta:

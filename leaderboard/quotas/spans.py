@@ -36,7 +36,7 @@ _SPAN: Final = re.compile(rf"\s*([\d,]{{1,12}})\s*({'|'.join(_UNITS)})s?\s*", re
 
 
 def parse_span(text: str, *, field: str = "") -> timedelta:
-    """The span of a text such as `quotas.span` writes, also of none (0 days). Raises `Refused`."""
+    """The span of a text such as `spans.span` writes, also of none (0 days). Raises `Refused`."""
     match = _SPAN.fullmatch(text)
     number = match[1].replace(",", "") if match else ""
     if match is None or not number:
