@@ -62,8 +62,8 @@ def join(*, split_name: str, truth: evaluator.GroundTruth, n: int, n_files: int)
     from leaderboard.queue import lifecycle  # noqa: PLC0415
     from leaderboard.storage import files  # noqa: PLC0415
 
-    split = Split.objects.select_related("published_edition").get(pk=split_name)
-    assert split.published_edition is not None
+    split = Split.objects.select_related("current_edition").get(pk=split_name)
+    assert split.current_edition is not None
     teams = Team.objects.bulk_create(
         Team(name=f"Team {split_name} {number}", look=skeleton(f"Team {split_name} {number}"))
         for number in range(-(-n // METHODS_OF_A_TEAM))
@@ -100,7 +100,7 @@ def join(*, split_name: str, truth: evaluator.GroundTruth, n: int, n_files: int)
     with transaction.atomic():
         Submission.objects.bulk_create(submissions)
         lifecycle.enqueue_many(
-            submission_ids=[submission.pk for submission in submissions], edition=split.published_edition
+            submission_ids=[submission.pk for submission in submissions], edition=split.current_edition
         )
 
 
@@ -114,7 +114,7 @@ def main() -> None:
     from leaderboard.models import Split  # noqa: PLC0415
     from leaderboard.storage import truth_values  # noqa: PLC0415
 
-    edition = Split.objects.select_related("published_edition").get(pk=split_name).published_edition
+    edition = Split.objects.select_related("current_edition").get(pk=split_name).current_edition
     assert edition is not None
     join(split_name=split_name, truth=truth_values.load(edition.ground_truth_id), n=n, n_files=n)
 

@@ -97,7 +97,7 @@ def quote(slug: str = "later", *, mid: float = 1.0) -> splits.Imported:
 
 
 def board_now() -> listing.Board:
-    split = Split.objects.select_related("published_edition__ground_truth").get(pk="test")
+    split = Split.objects.select_related("current_edition__ground_truth").get(pk="test")
     return listing.board(split=split, viewer=ANYBODY)
 
 

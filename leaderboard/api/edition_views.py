@@ -50,7 +50,7 @@ class EditionSerializer(serializers.Serializer[Edition]):
     url = serializers.SerializerMethodField(help_text="URL of its permanent page.")
 
     def get_is_board(self, edition: Edition) -> bool:
-        return edition.split.published_edition_id == edition.pk
+        return edition.split.current_edition_id == edition.pk
 
     def get_url(self, edition: Edition) -> str:
         return absolute("edition", edition.split_id, edition.number)
@@ -122,7 +122,7 @@ class PreviewSerializer(serializers.Serializer[preview.Preview]):
         return preview.rows(edition_preview)
 
 
-EDITIONS = Edition.objects.select_related("split__published_edition", "ground_truth")
+EDITIONS = Edition.objects.select_related("split__current_edition", "ground_truth")
 
 
 class EditionsView(APIView):

@@ -225,17 +225,17 @@ class SplitSerializer(serializers.Serializer[Split]):
     is_hidden = serializers.BooleanField(help_text="Whether the true values are hidden.")
     is_simulated = serializers.BooleanField(help_text="Whether the true values come from a simulation.")
     edition = serializers.IntegerField(
-        source="published_edition.number",
+        source="current_edition.number",
         help_text="Number of the published edition; null: none yet.",
         **NULLABLE,
     )
-    protocol = serializers.CharField(source="published_edition.protocol", help_text=PROTOCOL, **NULLABLE)
-    decimals = serializers.IntegerField(source="published_edition.decimals", help_text=DECIMALS, **NULLABLE)
+    protocol = serializers.CharField(source="current_edition.protocol", help_text=PROTOCOL, **NULLABLE)
+    decimals = serializers.IntegerField(source="current_edition.decimals", help_text=DECIMALS, **NULLABLE)
     ground_truth = serializers.CharField(
-        source="published_edition.ground_truth_id", help_text=GROUND_TRUTH, **NULLABLE
+        source="current_edition.ground_truth_id", help_text=GROUND_TRUTH, **NULLABLE
     )
     n_sequences = serializers.IntegerField(
-        source="published_edition.ground_truth.n_sequences", help_text=N_SEQUENCES, **NULLABLE
+        source="current_edition.ground_truth.n_sequences", help_text=N_SEQUENCES, **NULLABLE
     )
 
     def get_announcement(self, split: Split) -> str:

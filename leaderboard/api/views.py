@@ -86,7 +86,7 @@ class ManifestView(APIView):
     )
     def get(self, request: Request, split: str) -> HttpResponseBase:
         """All columns of the ground truth but the time to contact, as CSV."""
-        rows = Split.objects.shown().select_related("published_edition__ground_truth")
+        rows = Split.objects.shown().select_related("current_edition__ground_truth")
         row = get_object_or_404(rows, pk=split)
         digest = history.manifest_digest(split=row, number=request.GET.get("edition", ""))
         if digest is None:

@@ -139,7 +139,7 @@ def board(
     without values. Rows that only the viewer's own team sees carry the rank that they would have.
     `read` gives the rows that everybody sees, in `public_rows`' place. Raises `UnknownColumn`.
     """
-    edition = edition or (edition_at(split, at) if at else split.published_edition)
+    edition = edition or (edition_at(split, at) if at else split.current_edition)
     require_column(sort, rules=rules_of(edition))
     shown = (read or public_rows)(split=split, edition=edition, at=at)
     entries = with_own(shown, split=split, edition=edition, viewer=viewer, at=at)
@@ -287,10 +287,10 @@ def unscorable_in(edition: Edition, *, split: Split) -> dict[UUID, str]:
 
     By each the code of the reason.
     """
-    if split.published_edition_id in {None, edition.pk}:
+    if split.current_edition_id in {None, edition.pk}:
         return {}
     rejected = Evaluation.objects.filter(
-        edition=split.published_edition_id,
+        edition=split.current_edition_id,
         status=Status.REJECTED,
         submission__in=Evaluation.objects.filter(edition=edition, status=Status.SCORED).values("submission"),
     )

@@ -27,7 +27,7 @@ def moved(board: Board, *, now: datetime) -> Mapping[UUID, int]:
     Ranks of different editions are not compared.
     """
     edition = board.edition
-    if board.at is not None or edition is None or edition.pk != board.split.published_edition_id:
+    if board.at is not None or edition is None or edition.pk != board.split.current_edition_id:
         return {}
     before = _ranks_before(board, at=since(now=now))
     return {

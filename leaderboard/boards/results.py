@@ -38,7 +38,7 @@ def results(
     """
     per_split = []
     for split, drawn in snapshots.shown_on(splits if splits is not None else snapshots.splits()):
-        edition = split.published_edition
+        edition = split.current_edition
         entries = listing.with_own(drawn.entries, split=split, edition=edition, viewer=viewer)
         entry = next((entry for entry in entries if entry.method_id == method.pk), None)
         if entry is None or edition is None:

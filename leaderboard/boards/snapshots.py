@@ -67,9 +67,7 @@ def splits() -> list[Split]:
 
     Archived ones come last. It is a whole page's first statement.
     """
-    rows = (
-        Split.objects.shown().order_by("position", "name").select_related("published_edition__ground_truth")
-    )
+    rows = Split.objects.shown().order_by("position", "name").select_related("current_edition__ground_truth")
     rows = rows.annotate(**PageVersion.announcement_of_every_row(), board_number=F("board_version__number"))
     return sorted(rows, key=lambda split: split.is_archived)
 
@@ -97,7 +95,7 @@ def editions() -> "QuerySet[Edition]":
     rows = (
         Edition.objects.filter(split__in=Split.objects.shown())
         .exclude(published_at=None)
-        .select_related("split__published_edition__ground_truth", "ground_truth")
+        .select_related("split__current_edition__ground_truth", "ground_truth")
     )
     return rows.annotate(board_number=F("split__board_version__number"))
 
@@ -142,7 +140,7 @@ def shown(*, split: Split, edition: Edition) -> CurrentBoard:
 
 def shown_on(rows: Sequence[Split]) -> list[tuple[Split, CurrentBoard]]:
     """What everybody sees of each of these splits' boards, where there is one; `rows` are of `splits()`."""
-    with_board = [(split, split.published_edition) for split in rows if split.published_edition is not None]
+    with_board = [(split, split.current_edition) for split in rows if split.current_edition is not None]
     return [(split, shown(split=split, edition=edition)) for split, edition in with_board]
 
 
@@ -163,7 +161,7 @@ def _encoded(read: Callable[[], CurrentBoard]) -> bytes:
 
 def _now(edition_id: int) -> CurrentBoard:
     """The edition as the database has it at this moment."""
-    edition = Edition.objects.select_related("split__published_edition", "ground_truth").get(pk=edition_id)
+    edition = Edition.objects.select_related("split__current_edition", "ground_truth").get(pk=edition_id)
     entries = listing.public_rows(split=edition.split, edition=edition)
     return CurrentBoard(entries=entries, attempts=attempts(edition, methods=Method.objects.shown()))
 

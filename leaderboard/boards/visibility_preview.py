@@ -49,12 +49,10 @@ def preview(*, method: Method, visibility: str, now: datetime) -> VisibilityPrev
     others = _public_others(method)
     sights = []
     splits = (
-        Split.objects.shown()
-        .exclude(published_edition=None)
-        .select_related("published_edition__ground_truth")
+        Split.objects.shown().exclude(current_edition=None).select_related("current_edition__ground_truth")
     )
     for split in splits:
-        edition = split.published_edition
+        edition = split.current_edition
         rows = listing.public_rows(split=split, edition=edition, assuming_visible=assuming_visible)
         entry = next((row for row in rows if row.method_id == method.pk), None)
         if entry is not None and edition is not None:

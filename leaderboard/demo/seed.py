@@ -214,7 +214,7 @@ def _has_submitted(entry: DemoEntry) -> bool:
 
 
 def _open_split(truth: evaluator.GroundTruth, *, now: datetime) -> None:
-    edition = Split.objects.select_related("published_edition").get(pk=SPLIT).published_edition
+    edition = Split.objects.select_related("current_edition").get(pk=SPLIT).current_edition
     if edition is None:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "simulated.csv"

@@ -68,14 +68,14 @@ def open_edition(
     is at fault; nothing changes then.
     """
     require_maintainer(actor, to="change editions")
-    split = Split.objects.select_related("published_edition__ground_truth").filter(name=split_name).first()
-    if split is None or split.published_edition is None:
+    split = Split.objects.select_related("current_edition__ground_truth").filter(name=split_name).first()
+    if split is None or split.current_edition is None:
         raise Refused(
             "edition-refused",
             f"The split {split_name!r} has no published edition to correct; "
             f"open it with: manage.py import_truth {split_name} PATH",
         )
-    protocol = protocol or split.published_edition.protocol
+    protocol = protocol or split.current_edition.protocol
     get_protocol(protocol)
     if path is not None:
         row = ground_truth.add(split_name=split_name, path=path, now=now, actor=actor)
@@ -89,7 +89,7 @@ def open_edition(
         ).first()
         if edition is None:
             edition = ground_truth.new_edition(split=split, row=row, protocol=protocol, now=now, actor=actor)
-        elif edition.pk == split.published_edition_id:
+        elif edition.pk == split.current_edition_id:
             raise Refused(
                 "edition-refused",
                 f"{edition} has this ground truth, protocol and number of decimals ({split.decimals}), "
@@ -101,8 +101,8 @@ def open_edition(
 
 def _imported(split: Split, digest: str | None) -> GroundTruth:
     if digest is None:
-        assert split.published_edition is not None  # noqa: S101 - the caller has looked
-        return split.published_edition.ground_truth
+        assert split.current_edition is not None  # noqa: S101 - the caller has looked
+        return split.current_edition.ground_truth
     row = GroundTruth.objects.filter(split=split.truth_split_id, digest=digest).first()
     if row is None:
         raise Refused(
@@ -162,7 +162,7 @@ def unfinished(edition: Edition) -> list[Submission]:
 def newly_rejected(edition: Edition) -> list[Submission]:
     """Active submissions that the board scores and this edition rejects: publishing it takes them off."""
     here = Evaluation.objects.filter(edition=edition, status=Status.REJECTED)
-    board = Evaluation.objects.filter(edition=edition.split.published_edition_id, status=Status.SCORED)
+    board = Evaluation.objects.filter(edition=edition.split.current_edition_id, status=Status.SCORED)
     return list(
         active_submissions(edition)
         .filter(pk__in=here.values("submission"))
@@ -189,7 +189,7 @@ def publish(
     reason = _reason(reason)
     with transaction.atomic():
         edition, split = _locked(edition)
-        if edition.discarded_at or edition.pk == split.published_edition_id:
+        if edition.discarded_at or edition.pk == split.current_edition_id:
             state = "was discarded" if edition.discarded_at else "is the current board already"
             raise Refused("edition-refused", f"{edition} {state}; there is nothing to publish.")
         _require_same_board(split, replaces)
@@ -222,7 +222,7 @@ def roll_back(
         if former is None:
             raise Refused(
                 "edition-refused",
-                f"{split.published_edition or split.pk} replaced no edition; it cannot be rolled back.",
+                f"{split.current_edition or split.pk} replaced no edition; it cannot be rolled back.",
             )
         publication = ground_truth.make_board(
             edition=former,
@@ -238,13 +238,11 @@ def roll_back(
 def predecessor(split: Split) -> Edition | None:
     """The edition that rolling back returns to: the one that the board replaced when it was published."""
     latest = split.publications.filter(
-        edition=split.published_edition_id, kind=Publication.Kind.PUBLISHED
+        edition=split.current_edition_id, kind=Publication.Kind.PUBLISHED
     ).first()
     if latest is None or latest.replaced_id is None:
         return None
-    return Edition.objects.select_related("split__published_edition", "ground_truth").get(
-        pk=latest.replaced_id
-    )
+    return Edition.objects.select_related("split__current_edition", "ground_truth").get(pk=latest.replaced_id)
 
 
 def discard(*, edition: Edition, reason: str, now: datetime, actor: User | None) -> None:
@@ -274,7 +272,7 @@ def _locked(edition: Edition) -> tuple[Edition, Split]:
 
 
 def _require_same_board(split: Split, replaces: int | None) -> None:
-    published = split.published_edition.number if split.published_edition else None
+    published = split.current_edition.number if split.current_edition else None
     if published != replaces:
         raise Refused(
             "edition-refused",

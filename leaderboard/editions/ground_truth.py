@@ -38,11 +38,11 @@ def import_truth(
         existing = Edition.objects.filter(split=split, ground_truth=row, protocol=protocol).first()
         if existing is not None:
             return existing
-        if split.published_edition is not None:
+        if split.current_edition is not None:
             raise Refused(
                 "edition-refused",
-                f"The split {split.pk!r} has {split.published_edition} with other ground truth "
-                f"({split.published_edition.ground_truth.short_digest}) or rules; open a correction beside "
+                f"The split {split.pk!r} has {split.current_edition} with other ground truth "
+                f"({split.current_edition.ground_truth.short_digest}) or rules; open a correction beside "
                 f"it with: manage.py open_edition {split.pk} --truth {path.name}",
             )
         edition = new_edition(split=split, row=row, protocol=protocol, now=now, actor=actor)
@@ -62,12 +62,12 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
     Raises `evaluator.Rejected` if the file is at fault or has no sequence of the published manifest,
     `Refused` if the split is unknown or the ground truth belongs to another one.
     """
-    split = Split.objects.select_related("published_edition__ground_truth").filter(name=split_name).first()
+    split = Split.objects.select_related("current_edition__ground_truth").filter(name=split_name).first()
     if split is None:
         known = ", ".join(Split.objects.values_list("name", flat=True))
         raise Refused("unknown-split", f"There is no split {split_name!r}; expected one of {known}.")
     truth = evaluator.read_truth(path)
-    old = split.published_edition.ground_truth if split.published_edition else None
+    old = split.current_edition.ground_truth if split.current_edition else None
     counts = _compared(old, truth)
     # Before anything is written: the mark of hidden values would stay on those of an open split.
     _require_own(split, GroundTruth.objects.filter(digest=truth.digest).first())
@@ -136,12 +136,12 @@ def uncompared(*, readable_truths: Collection[str]) -> list[tuple[GroundTruth, G
         published_at=None,
         discarded_at=None,
         ground_truth__in=readable_truths,
-        split__published_edition__ground_truth__in=readable_truths,
-    ).select_related("ground_truth", "split__published_edition__ground_truth")
+        split__current_edition__ground_truth__in=readable_truths,
+    ).select_related("ground_truth", "split__current_edition__ground_truth")
     pairs = {
-        (edition.split.published_edition.ground_truth, edition.ground_truth)
+        (edition.split.current_edition.ground_truth, edition.ground_truth)
         for edition in editions
-        if edition.split.published_edition is not None
+        if edition.split.current_edition is not None
     }
     return [
         (old, new)
@@ -199,12 +199,12 @@ def make_board(
 ) -> Publication:
     """Point the split, whose row the caller has locked, at this edition, and write the changelog."""
     split = edition.split
-    replaced = split.published_edition
+    replaced = split.current_edition
     if edition.published_at is None:
         edition.published_at = now
         edition.save(update_fields=["published_at"])
-    split.published_edition = edition
-    split.save(update_fields=["published_edition"])
+    split.current_edition = edition
+    split.save(update_fields=["current_edition"])
     audit.record(
         verb=kind.lower(),
         noun="Edition",

@@ -92,7 +92,7 @@ def record_of(
     log = changelog(edition.split) if publications is None else publications
     own = tuple(each for each in log if each.edition_id == edition.pk)
     replaced_by = next((each for each in log if each.replaced_id == edition.pk), None)
-    is_board = edition.split.published_edition_id == edition.pk
+    is_board = edition.split.current_edition_id == edition.pk
     followed = own[-1].replaced if own else None
     return EditionRecord(
         edition=edition,
@@ -148,7 +148,7 @@ def rescored(submission: Submission) -> Rescored | None:
 def maintainer_overview(split: Split) -> dict[str, Any]:
     """The editions of a split as maintainers see them, and system errors."""
     rows = list(split.editions.select_related("ground_truth", "split").order_by("-number"))
-    published = next((e for e in rows if e.pk == split.published_edition_id), None)
+    published = next((e for e in rows if e.pk == split.current_edition_id), None)
     failed = Evaluation.objects.filter(status=Status.SYSTEM_ERROR, submission__withdrawn_at=None)
     n_failed = dict(
         failed.filter(edition__in=rows).values_list("edition").annotate(n=Count("pk")).order_by("edition")
@@ -167,7 +167,7 @@ def maintainer_overview(split: Split) -> dict[str, Any]:
 def manifest_digest(*, split: Split, number: str) -> str | None:
     """The manifest of the board, or of the edition of a number that is or was it; None for no such one."""
     if not number:
-        return split.published_edition.ground_truth.manifest_digest if split.published_edition else None
+        return split.current_edition.ground_truth.manifest_digest if split.current_edition else None
     if not (number.isascii() and number.isdigit() and len(number) < 7):
         return None
     editions = split.editions.filter(number=int(number)).exclude(published_at=None)

@@ -37,14 +37,14 @@ def look(*, split_name: str, path: Path) -> LabelChanges:
     Raises `evaluator.Rejected` if the file is at fault, `Refused` if the split has no board, `OSError` if
     the board's values are not here.
     """
-    split = Split.objects.select_related("published_edition__ground_truth").filter(name=split_name).first()
-    if split is None or split.published_edition is None:
+    split = Split.objects.select_related("current_edition__ground_truth").filter(name=split_name).first()
+    if split is None or split.current_edition is None:
         raise Refused(
             "edition-refused", f"The split {split_name!r} has no published edition to compare with."
         )
     new = evaluator.read_truth(path)
-    old = truth_values.load(split.published_edition.ground_truth_id)
-    return LabelChanges(split.published_edition, compare(old, new), _by_recording(old, new))
+    old = truth_values.load(split.current_edition.ground_truth_id)
+    return LabelChanges(split.current_edition, compare(old, new), _by_recording(old, new))
 
 
 def _by_recording(old: evaluator.GroundTruth, new: evaluator.GroundTruth) -> list[dict[str, Any]]:

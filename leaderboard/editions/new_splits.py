@@ -82,7 +82,7 @@ def add_split(
             actor=actor,
             details={"title": split.title, "is_hidden": split.is_hidden, "same_truth_as": same_truth_as},
         )
-        if other is not None and other.published_edition is not None:
+        if other is not None and other.current_edition is not None:
             _publish_like(other, split, now=now, actor=actor)
         board_versions.bump(name)
     return split
@@ -91,8 +91,8 @@ def add_split(
 def _sharing(name: str) -> Split:
     """The split whose ground truth is to be shared, locked until the transaction ends."""
     split = Split.objects.select_for_update(no_key=True).filter(pk=name).first()
-    if split is None or split.published_edition_id is None or split.same_truth_as_id is not None:
-        able = Split.objects.filter(same_truth_as=None).exclude(published_edition=None)
+    if split is None or split.current_edition_id is None or split.same_truth_as_id is not None:
+        able = Split.objects.filter(same_truth_as=None).exclude(current_edition=None)
         known = ", ".join(able.values_list("name", flat=True)) or "none, because none has ground truth yet"
         raise Refused(
             "unknown-split",
@@ -103,7 +103,7 @@ def _sharing(name: str) -> Split:
 
 
 def _publish_like(other: Split, split: Split, *, now: datetime, actor: User | None) -> None:
-    board = other.published_edition
+    board = other.current_edition
     assert board is not None  # noqa: S101 - the caller has looked
     edition = ground_truth.new_edition(
         split=split, row=board.ground_truth, protocol=board.protocol, now=now, actor=actor

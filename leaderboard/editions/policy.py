@@ -143,7 +143,7 @@ def checked(split: Split, policy: Policy) -> Split:
         setattr(split, name, value)
     try:
         # Its name is checked where it is given; an edition has its own ways.
-        split.full_clean(exclude=["published_edition", "name"], validate_unique=False)
+        split.full_clean(exclude=["current_edition", "name"], validate_unique=False)
     except ValidationError as error:
         [field, *_] = error.message_dict
         raise Refused(

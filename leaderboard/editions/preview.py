@@ -119,7 +119,7 @@ def preview(edition: Edition) -> Preview:
 
     Raises `Refused` if the split has no published edition.
     """
-    published = edition.split.published_edition
+    published = edition.split.current_edition
     if published is None:
         raise Refused(
             "edition-refused", f"The split {edition.split_id!r} has no published edition to compare with."

@@ -40,7 +40,7 @@ def require_maintainer(actor: User | None, *, to: str) -> None:
 def shown_split(name: str) -> Split:
     """The split of that name, with its published edition and ground truth. Raises `Refused`."""
     # Looked up here and not there: not every text is one that a database can be asked for.
-    rows = Split.objects.shown().select_related("published_edition__ground_truth")
+    rows = Split.objects.shown().select_related("current_edition__ground_truth")
     splits = {split.name: split for split in rows}
     if name not in splits:
         sentence = f"There is no split {name[:80]!r}; expected one of {', '.join(splits)}."

@@ -20,7 +20,7 @@ _FACTS: Final[Mapping[str, _Fact]] = {
     "edition": lambda evaluation, _: evaluation.edition.number,
     "protocol": lambda evaluation, _: evaluation.edition.protocol,
     "ground_truth": lambda evaluation, _: evaluation.edition.ground_truth_id,
-    "is_board": lambda evaluation, _: evaluation.edition.split.published_edition_id == evaluation.edition_id,
+    "is_board": lambda evaluation, _: evaluation.edition.split.current_edition_id == evaluation.edition_id,
     "status": lambda evaluation, _: evaluation.status,
     "method_id": lambda _, submission: str(submission.method_id),
     "method": lambda _, submission: submission.method.name,

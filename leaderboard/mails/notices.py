@@ -88,7 +88,7 @@ def _scored(since: datetime, now: datetime) -> Iterator[Mail]:
             finished_at__gt=since,
             status__in=_OUTCOMES,
             priority=Evaluation.PRIORITY_LIVE,
-            edition=F("submission__split__published_edition"),
+            edition=F("submission__split__current_edition"),
             submission__withdrawn_at=None,
             submission__via=Submission.Via.WEB,
             submission__submitted_by__in=readers(MailKind.SCORED),

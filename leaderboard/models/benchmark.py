@@ -94,7 +94,7 @@ class Split(QuotaRules):
         choices=[(1, "one"), (2, "two")],
         help_text="With how many decimals its next edition publishes. Each one tells more of hidden values.",
     )
-    published_edition = models.ForeignKey(
+    current_edition = models.ForeignKey(
         "Edition", null=True, blank=True, on_delete=models.PROTECT, related_name="+"
     )
 
@@ -169,7 +169,7 @@ class Split(QuotaRules):
     @property
     def has_ground_truth(self) -> bool:
         """Whether there is something to score against; `quotas.admissions` says when files are taken."""
-        return self.published_edition_id is not None
+        return self.current_edition_id is not None
 
 
 class GroundTruth(models.Model):
@@ -290,7 +290,7 @@ class Edition(UnitOfInference):
 
         `split` is the edition's own, with its published edition as of now.
         """
-        if self.published_at is None or split.published_edition_id == self.pk:
+        if self.published_at is None or split.current_edition_id == self.pk:
             return None
         ends = Publication.objects.filter(replaced=self).order_by("-at", "-pk")
         return ends.values_list("at", flat=True).first()

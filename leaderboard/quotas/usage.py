@@ -145,7 +145,7 @@ def _spent(
     evaluations = Evaluation.objects.filter(submission=OuterRef("pk"))
     # Scoring anew after a correction costs nothing. It gives a slot back where the board cannot score what
     # another edition has scored: the team has to send another file, and for no fault of its own.
-    board = evaluations.filter(edition=split.published_edition_id)
+    board = evaluations.filter(edition=split.current_edition_id)
     live = evaluations.filter(priority=Evaluation.PRIORITY_LIVE)
     rows = (
         Submission.objects.filter(_theirs(team, user), split=split, submitted_at__gt=since)

@@ -37,7 +37,7 @@ def for_submission(*, submission: Submission, viewer: User | AnonymousUser) -> A
     if split.is_hidden or not Submission.objects.visible_to(viewer).filter(pk=submission.pk).exists():
         return None
     return Analysis.objects.filter(
-        evaluation__submission=submission, evaluation__edition=split.published_edition_id
+        evaluation__submission=submission, evaluation__edition=split.current_edition_id
     ).first()
 
 
@@ -47,12 +47,12 @@ def for_submission(*, submission: Submission, viewer: User | AnonymousUser) -> A
 def missing(*, readable_truths: Collection[str]) -> QuerySet[Evaluation]:
     """Entries on the board of an open split without an analysis, the newest first."""
     opened = [digest for digest in readable_truths if not hidden_marks.is_marked(digest)]
-    boards = Split.objects.filter(is_hidden=False, published_edition__ground_truth__in=opened)
+    boards = Split.objects.filter(is_hidden=False, current_edition__ground_truth__in=opened)
     return (
         Evaluation.objects.filter(
             status=Status.SCORED,
             analysis=None,
-            edition__in=boards.values("published_edition"),
+            edition__in=boards.values("current_edition"),
             submission__withdrawn_at=None,
         )
         .select_related("edition__ground_truth", "edition__split", "submission")

@@ -137,7 +137,7 @@ def _answers(
 def _record(request: SubmissionRequest, file: files.StoredFile, *, split: Split) -> Submitted:
     """Write the rows of a stored file and queue it. Raises `Refused` or `usage.QuotaExceeded`."""
     # From here on the board stays, so the file is queued in an edition with the manifest that its row names.
-    split = Split.objects.select_related("published_edition__ground_truth").lock_shared(split.pk)
+    split = Split.objects.select_related("current_edition__ground_truth").lock_shared(split.pk)
     team = _locked_team(request.user)
     method, sent_before, changes = _answers(request, file, split=split, team=team)
     if sent_before is not None:
@@ -177,7 +177,7 @@ def _locked_team(user: User) -> Team:
 def _queue(submission: Submission, *, split: Split) -> None:
     """Queue the submission for the published edition and any draft; the caller has locked the split."""
     in_preparation = Q(published_at=None, discarded_at=None)
-    for edition in split.editions.filter(in_preparation | Q(pk=split.published_edition_id)):
+    for edition in split.editions.filter(in_preparation | Q(pk=split.current_edition_id)):
         lifecycle.enqueue(submission=submission, edition=edition)
 
 
@@ -207,8 +207,8 @@ def _sent_before(file: files.StoredFile, *, split: Split, method: Method) -> Sub
 
 
 def _sent_file(file: files.StoredFile, split: Split) -> SentFile:
-    assert split.published_edition is not None  # noqa: S101 - for the type checker: the split takes files
-    return SentFile(file.digest, split.published_edition.ground_truth.manifest_digest)
+    assert split.current_edition is not None  # noqa: S101 - for the type checker: the split takes files
+    return SentFile(file.digest, split.current_edition.ground_truth.manifest_digest)
 
 
 def _checked(upload: "File[bytes] | None") -> "File[bytes]":

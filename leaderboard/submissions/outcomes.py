@@ -132,9 +132,9 @@ def _positions(pairs: Sequence[tuple[Submission, Progress]]) -> dict[UUID, Board
         return {}
     wanted = {submission.split_id for submission, _ in pairs}
     boards = {
-        split.pk: (split.published_edition, drawn)
+        split.pk: (split.current_edition, drawn)
         for split, drawn in snapshots.shown_on([each for each in snapshots.splits() if each.pk in wanted])
-        if split.published_edition is not None
+        if split.current_edition is not None
     }
     # In another edition than the present board's it has no position.
     pairs = [

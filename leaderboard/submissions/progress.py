@@ -46,7 +46,7 @@ class Progress:
 
 def evaluation_of(submission: Submission) -> Evaluation:
     """The evaluation shown for a submission: in the published edition, else the latest, drafts last."""
-    published = submission.split.published_edition_id
+    published = submission.split.current_edition_id
     evaluations = sorted(submission.evaluations.all(), key=_edition_order)
     return next((e for e in evaluations if e.edition_id == published), evaluations[-1])
 

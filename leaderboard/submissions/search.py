@@ -31,7 +31,7 @@ def matching(
         return rows.filter(withdrawn_at__isnull=False)
     if state:
         # The evaluation that speaks for a submission, by the rule of `progress.evaluation_of`.
-        is_current = Case(When(edition=F("submission__split__published_edition"), then=1), default=0)
+        is_current = Case(When(edition=F("submission__split__current_edition"), then=1), default=0)
         is_published = Case(When(edition__published_at=None, then=0), default=1)
         speaking = (
             Evaluation.objects.filter(submission=OuterRef("pk"))

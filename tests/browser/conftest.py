@@ -32,7 +32,7 @@ from leaderboard.people import teams
 from tests import board_rows
 user = User.objects.create_user({BOARD_OWNER!r}, {PASSWORD!r}, name="Owners")
 EmailAddress.objects.create(user=user, email=user.email, verified=True, primary=True)
-methods = board_rows.fill(Split.objects.get(pk="demo").published_edition, n={N_SHOWN + 1}, user=user)
+methods = board_rows.fill(Split.objects.get(pk="demo").current_edition, n={N_SHOWN + 1}, user=user)
 Method.objects.filter(pk=methods[0].pk).update(name="A" * 80)
 own = Method.objects.filter(pk=methods[1].pk)
 own.update(name="B" * 80, visibility="PRIVATE", team=teams.team_of(user=user))

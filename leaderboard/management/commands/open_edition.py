@@ -57,9 +57,9 @@ class Command(RefusingCommand):
             actor=None,
         )
         published = (
-            Split.objects.select_related("published_edition__ground_truth")
+            Split.objects.select_related("current_edition__ground_truth")
             .get(pk=edition.split_id)
-            .published_edition
+            .current_edition
         )
         assert published is not None  # noqa: S101 - for the type checker: a correction was opened beside it
         change = history.change_of_truth(published.ground_truth, edition.ground_truth)

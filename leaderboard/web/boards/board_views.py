@@ -48,7 +48,7 @@ def draw_board(
             query,
             asked=request.GET,
             faults=faults,
-            latest_day=now.date() if edition is None and split.published_edition else None,
+            latest_day=now.date() if edition is None and split.current_edition else None,
         ),
         "exports": export_views.offers(shown, edition, query),
         "n_withdrawn": sum(entry.withdrawn_at is not None for entry in shown.unfiltered),

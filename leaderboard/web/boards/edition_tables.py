@@ -40,7 +40,7 @@ def truth_words(change: history.TruthChange | None) -> str:
 
 def truth_choices(split: Split, truths: Sequence[GroundTruth]) -> tuple[tuple[GroundTruth, str], ...]:
     """Ground truths, each with what differs from the board's, in words; "" for the board's own."""
-    board = split.published_edition.ground_truth if split.published_edition else None
+    board = split.current_edition.ground_truth if split.current_edition else None
     changes = (history.change_of_truth(board, truth) if board else None for truth in truths)
     words = (truth_words(change) if change else "not compared" for change in changes)
     return tuple(zip(truths, words, strict=True))

@@ -134,7 +134,7 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
     sources = sorted({entry.source: entry.paper_url for entry in pages.object_list if entry.source}.items())
     numbers = {citation: i for i, (citation, _) in enumerate(sources, 1)}
     edition = board.edition
-    is_present = edition is not None and edition.pk == board.split.published_edition_id and not board.at
+    is_present = edition is not None and edition.pk == board.split.current_edition_id and not board.at
     counts = edition.ground_truth.counts if edition else {}
     # Among all rows: no filter makes a row new, or old.
     new = _new_among(board.unfiltered, today=now.date()) if not board.at else frozenset()
@@ -146,7 +146,7 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
             team=team_of(entry),
             cells=score_cells(entry, names=names, scales=scales),
             source_number=numbers.get(entry.source),
-            note=_note(entry, board.split.published_edition),
+            note=_note(entry, board.split.current_edition),
             attempts=_attempts(entry),
             is_new=entry.method_id in new,
             moved=moved.get(entry.method_id, 0) if entry.method_id else 0,

@@ -39,7 +39,7 @@ class OpenForm(SiteForm):
     )
 
     def __init__(self, data: Any = None, *, split: Split) -> None:
-        published = split.published_edition
+        published = split.current_edition
         self.truths = list(GroundTruth.objects.filter(split=split.truth_split_id).order_by("-imported_at"))
         initial = {"digest": published.ground_truth_id, "protocol": published.protocol} if published else {}
         super().__init__(data, initial=initial)

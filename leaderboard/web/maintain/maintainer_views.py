@@ -62,7 +62,7 @@ def maintainers_form(view: View) -> View:
 @require_safe
 def hub(request: HttpRequest) -> HttpResponse:
     """Show the maintainers' overview: every split with its board, editions in preparation and failures."""
-    splits = Split.objects.select_related("published_edition__ground_truth")
+    splits = Split.objects.select_related("current_edition__ground_truth")
     desks = [
         (desk, [edition_tables.running(*each) for each in desk["in_preparation"]])
         for desk in map(history.maintainer_overview, splits)
@@ -82,7 +82,7 @@ def hub(request: HttpRequest) -> HttpResponse:
 @maintainers_form
 def open_edition(request: HttpRequest, split: str) -> HttpResponse:
     """Open a draft edition and queue every active submission for it."""
-    split_row = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
+    split_row = get_object_or_404(Split.objects.select_related("current_edition__ground_truth"), pk=split)
     form = OpenForm.asked(request, split=split_row)
     if form.is_valid():
         with form.refusals():
@@ -185,7 +185,7 @@ def maintainer_of(request: HttpRequest) -> User:
 
 
 def _edition(split: str, number: int) -> Edition:
-    rows = Edition.objects.select_related("split__published_edition__ground_truth", "ground_truth")
+    rows = Edition.objects.select_related("split__current_edition__ground_truth", "ground_truth")
     return get_object_or_404(rows, split=split, number=number)
 
 

@@ -210,9 +210,7 @@ def team(request: HttpRequest, team_id: UUID) -> HttpResponse:
 
 def _with_states(sent: Iterable[Submission]) -> list[Submission]:
     rows = list(sent)
-    decided = Evaluation.objects.filter(
-        submission__in=rows, edition=F("submission__split__published_edition")
-    )
+    decided = Evaluation.objects.filter(submission__in=rows, edition=F("submission__split__current_edition"))
     states = {row.submission_id: row.get_status_display() for row in decided}
     for row in rows:
         row.state = states.get(row.pk, "")  # type: ignore[attr-defined]  # for the template

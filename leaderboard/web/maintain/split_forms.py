@@ -136,7 +136,7 @@ class NewSplitForm(PolicyForm):
 
     def __init__(self, data: Any = None, *, initial: Any = None) -> None:
         super().__init__(data, initial=initial)
-        able = Split.objects.filter(same_truth_as=None).exclude(published_edition=None)
+        able = Split.objects.filter(same_truth_as=None).exclude(current_edition=None)
         self.fields["truth"].choices = [  # type: ignore[attr-defined]  # a ChoiceField
             ("hidden", "its own, hidden"),
             ("open", "its own, open"),

@@ -31,7 +31,7 @@ def splits(request: HttpRequest) -> HttpResponse:
     now = timezone.now()
     rows = [
         (split, admissions.sentence_of(split, now=now) or "Open.", quota_tables.sentence_of(split))
-        for split in Split.objects.select_related("published_edition")
+        for split in Split.objects.select_related("current_edition")
     ]
     return render(request, "maintain/splits.html", {"rows": rows})
 

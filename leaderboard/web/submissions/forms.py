@@ -36,7 +36,7 @@ def offers_for(user: User, *, now: datetime) -> list[SplitChoice]:
     """Every split as this person finds it."""
     team = teams.current_team_of(user=user)
     offers = []
-    for split in Split.objects.shown().select_related("published_edition__ground_truth"):
+    for split in Split.objects.shown().select_related("current_edition__ground_truth"):
         refusal = admissions.refusal_for_all(split, now=now) or admissions.refusal_of(team=team, split=split)
         if refusal is None:
             quota = usage.state(team=team, user=user, split=split, now=now)

@@ -70,7 +70,7 @@ def _taken(request: HttpRequest, taken: Submission) -> HttpResponse:
 @require_safe
 def template(request: HttpRequest, split: str) -> HttpResponseBase:
     """A prediction file of the split with all its anno_ids and no value, to be filled in."""
-    edition = split_or_404(request, split).published_edition
+    edition = split_or_404(request, split).current_edition
     if edition is None:
         raise Http404
     tag = f'"template-{edition.ground_truth.manifest_digest}"'
@@ -177,7 +177,7 @@ def _outcome(request: HttpRequest, row: Submission, progress: Progress) -> dict[
 @own_page
 def analysis(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """Error by time to contact, its distribution, predicted against true, the worst recordings."""
-    rows = Submission.objects.visible_to(request.user).select_related("method", "split__published_edition")
+    rows = Submission.objects.visible_to(request.user).select_related("method", "split__current_edition")
     row = get_object_or_404(rows, pk=submission_id, split__is_hidden=False)
     progress = progress_of(row)
     if progress.is_final and progress.state != Status.SCORED:

@@ -18,7 +18,7 @@ ANYBODY = AnonymousUser()
 
 
 def rows(viewer: Any = ANYBODY) -> dict[str, Entry]:
-    split = Split.objects.select_related("published_edition__ground_truth").get(pk="test")
+    split = Split.objects.select_related("current_edition__ground_truth").get(pk="test")
     return {entry.method: entry for entry in listing.board(split=split, viewer=viewer).entries}
 
 

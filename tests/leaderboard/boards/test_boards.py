@@ -16,7 +16,7 @@ ANYBODY = AnonymousUser()
 
 
 def split_called(name: str = "test") -> Split:
-    return Split.objects.select_related("published_edition").get(pk=name)
+    return Split.objects.select_related("current_edition").get(pk=name)
 
 
 def ranks(board: listing.Board) -> list[tuple[int | None, str]]:

@@ -55,7 +55,7 @@ def test_rescoring_gives_what_the_evaluator_gives_without_reading_the_file_again
         files.store().delete(files.predictions_name(submission.digest))
     builders.score_all()
     truth = read_truth(path)
-    old = truth_values.load(Split.objects.get(pk="test").published_edition.ground_truth_id)
+    old = truth_values.load(Split.objects.get(pk="test").current_edition.ground_truth_id)
     for submission, factor in zip(entries, FACTORS, strict=True):
         evaluation = Evaluation.objects.get(submission=submission, edition=edition)
         values = Predictions.from_arrays(

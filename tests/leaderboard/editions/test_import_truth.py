@@ -24,7 +24,7 @@ def test_first_import_opens_and_publishes_edition_one(tmp_path: Path) -> None:
     edition = builders.import_truth(tmp_path)
     split = Split.objects.get(name="test")
     assert (edition.number, edition.protocol) == (1, "tsttc-1")
-    assert split.published_edition == edition
+    assert split.current_edition == edition
     assert edition.published_at is not None
     assert edition.ground_truth.n_sequences == builders.N_SEQUENCES
     assert edition.ground_truth.counts["overall"] == builders.N_SEQUENCES
@@ -60,7 +60,7 @@ def test_other_truth_for_an_open_split_is_refused(tmp_path: Path) -> None:
     first = builders.import_truth(tmp_path)
     with pytest.raises(Refused, match="has test edition 1 with other ground truth"):
         builders.import_truth(tmp_path, seed=1)
-    assert Split.objects.get(name="test").published_edition == first
+    assert Split.objects.get(name="test").current_edition == first
 
 
 def test_one_truth_belongs_to_one_split(tmp_path: Path) -> None:

@@ -77,7 +77,7 @@ def challenge(edition: Edition) -> Split:
 def test_a_challenge_shares_ground_truth_and_has_its_own_deadline_quota_and_board(
     challenge: Split, edition: Edition, owner: User, client: Client
 ) -> None:
-    board = challenge.published_edition
+    board = challenge.current_edition
     assert board is not None
     assert (board.number, board.ground_truth_id) == (1, edition.ground_truth_id)
     assert challenge.is_hidden

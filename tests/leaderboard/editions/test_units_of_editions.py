@@ -68,7 +68,7 @@ def compared(*sent: Submission, edition: Edition | None = None) -> comparisons.C
     def ask() -> comparisons.Compared:
         return comparisons.compare(
             methods=[each.method_id for each in sent],
-            split=Split.objects.select_related("published_edition__ground_truth").get(pk="test"),
+            split=Split.objects.select_related("current_edition__ground_truth").get(pk="test"),
             edition=edition,
             viewer=ANYBODY,
             now=timezone.now(),

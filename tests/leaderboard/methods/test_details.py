@@ -217,7 +217,7 @@ def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
     hidden = {"pretraining": "Larknet's own", "hardware": "the larks' GPU", "code_url": "https://example.org"}
     editing.edit(method=veiled, changes={"n_frames": 6, "n_parameters": 9_000, **hidden}, actor=owner)
     builders.score_all()
-    split = Split.objects.select_related("published_edition").get(pk="test")
+    split = Split.objects.select_related("current_edition").get(pk="test")
 
     def names(**params: str) -> list[str]:
         board = listing.board(split=split, viewer=ANYBODY, filters=filters.parse(params))

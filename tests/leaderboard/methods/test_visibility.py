@@ -40,7 +40,7 @@ SECRETS = (
 
 
 def split() -> Split:
-    return Split.objects.select_related("published_edition__ground_truth").get(pk="test")
+    return Split.objects.select_related("current_edition__ground_truth").get(pk="test")
 
 
 def rows(viewer: Any = ANYBODY) -> dict[str, Entry]:

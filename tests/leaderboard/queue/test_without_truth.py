@@ -54,7 +54,7 @@ def test_a_worker_with_another_ground_truth_does_what_it_can(
 ) -> None:
     other = builders.import_truth(tmp_path, split="val", seed=1)
     builders.submit(owner, builders.predictions(other), split="val")
-    truth_values.values_path(waiting.split.published_edition.ground_truth_id).unlink()
+    truth_values.values_path(waiting.split.current_edition.ground_truth_id).unlink()
     assert builders.score_all() == 1
     assert state(waiting) == ("QUEUED", 0, 0, 0)
 

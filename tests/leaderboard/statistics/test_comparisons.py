@@ -25,7 +25,7 @@ def ask(
 ) -> comparisons.Compared:
     return comparisons.compare(
         methods=[submission.method_id for submission in sent],
-        split=Split.objects.select_related("published_edition__ground_truth").get(pk=split),
+        split=Split.objects.select_related("current_edition__ground_truth").get(pk=split),
         viewer=viewer,
         now=timezone.now(),
     )
@@ -124,7 +124,7 @@ def test_unknown_and_invisible_methods_look_alike_to_everybody(
             ask(entries[0], entries[1], viewer=viewer)
         texts.append(str(refused.value).replace(str(entries[0].method_id), "ID"))
     unknown = uuid.uuid4()
-    split = Split.objects.select_related("published_edition").get(pk="test")
+    split = Split.objects.select_related("current_edition").get(pk="test")
     with pytest.raises(UnknownMethod) as refused:
         comparisons.compare(
             methods=[unknown, entries[1].method_id], split=split, viewer=ANYBODY, now=timezone.now()

@@ -21,7 +21,7 @@ def main_text(client: Client, address: str) -> str:
 
 
 def board_number() -> int:
-    published = Split.objects.get(pk="test").published_edition
+    published = Split.objects.get(pk="test").current_edition
     assert published is not None
     return published.number
 
