@@ -25,7 +25,7 @@ from leaderboard.web.boards.whiskers import WhiskerScale
 
 SCORED_DECIMALS: Final = 2
 NOTHING: Final = SafeString("")
-MARKED: Final = "possibly best in its column (95 % confidence)"
+MARKED: Final = "statistically tied for best in its column (95 % confidence)"
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,9 @@ class Cell:
     range_css: str = ""  # as the heading's
     is_best: bool = False
     is_second: bool = False
-    is_with_best: bool = False  # possibly best in its column (95 % confidence): its rank range begins at 1
+    is_with_best: bool = (
+        False  # statistically tied for best in its column (95 % confidence): its rank range begins at 1
+    )
     interval: str = ""  # in words
     whisker: SafeString = NOTHING
     has_room: bool = False  # for a whisker: its column has one, though this value may have none

@@ -134,9 +134,9 @@ def _curve_series(run: Sequence[Row], metric: Metric, *, grid: int) -> Iterator[
         for middle, row in zip(middles, run, strict=True)
         if (interval := _interval(row, metric)) is not None
     ]
-    yield band(SPAN, spans, "--accent", grid=grid)
-    yield line(MEAN, [(mark.x, mark.y) for mark in points], "--accent", grid=grid)
-    yield marks(MEAN, points, Look("--accent", size=5.0), grid=grid) | {"upright": True}
+    yield band(SPAN, spans, "--s1", grid=grid)
+    yield line(MEAN, [(mark.x, mark.y) for mark in points], "--s1", grid=grid)
+    yield marks(MEAN, points, Look("--s1", size=5.0), grid=grid) | {"upright": True}
 
 
 def _seconds(row: Row) -> str:
@@ -167,7 +167,7 @@ def histogram(bins: Sequence[Row]) -> Chart:
     frame = Frame(
         x_axes=[bar_axis],
         y_axes=[y_axis("Sequences", {"type": "value", "min": 0, "minInterval": 1})],
-        series=[bars("Sequences", bar_marks, "--accent")],
+        series=[bars("Sequences", bar_marks, "--s1")],
         further_x_axes=[x_axis(f"{MID.title} ({MID.symbol}), {MID.unit}", scale)],
     )
     return Chart(
@@ -215,8 +215,8 @@ def scatter(drawn: Mapping[str, Sequence[float]]) -> Chart:
         )
         for true_s, predicted_s in pairs
     ]
-    cloud = marks("Sequences", points, Look("--accent", size=5.0))
-    cloud["itemStyle"] = {"color": "--accent", "opacity": 0.6}
+    cloud = marks("Sequences", points, Look("--s1", size=5.0))
+    cloud["itemStyle"] = {"color": "--s1", "opacity": 0.6}
     frame = Frame(
         x_axes=[x_axis("True time to contact in s", _TTC_AXIS)],
         y_axes=[y_axis("Predicted, s", _TTC_AXIS)],

@@ -95,7 +95,7 @@ def _front_series(
         series.append(marks(name, behind, Look("--quiet", symbol, 9.0, is_hollow=True)))
         ahead = [i for i, each in enumerate(front) if each.entry.kind == kind]
         drawn = [each.mark(praise) for each in front]
-        series.append(named_marks(name, drawn, ahead, Look("--accent", symbol, 11.0)))
+        series.append(named_marks(name, drawn, ahead, Look("--s1", symbol, 11.0)))
     return series, names
 
 
@@ -176,7 +176,7 @@ ZOOMABLE: Final = {
             "dataZoom": {
                 "yAxisIndex": "none",
                 "filterMode": "none",
-                "brushStyle": {"color": "--accent", "opacity": 0.15},
+                "brushStyle": {"color": "--s1", "opacity": 0.15},
             }
         },
     }

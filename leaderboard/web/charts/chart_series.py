@@ -21,7 +21,7 @@ SERIES_SYMBOLS: Final = (
 class Look:
     """How the marks of a series are drawn."""
 
-    ink: str = "--accent"
+    ink: str = "--s1"
     symbol: str = "circle"
     size: float = 9.0
     is_hollow: bool = False
@@ -80,8 +80,8 @@ def staircase(name: str, corners: Iterable[tuple[float, float]]) -> Option:
         "step": "end",
         "showSymbol": False,
         "symbol": "none",
-        "lineStyle": {"color": "--accent", "width": 2},
-        "itemStyle": {"color": "--accent"},
+        "lineStyle": {"color": "--s1", "width": 2},
+        "itemStyle": {"color": "--s1"},
         "data": [list(corner) for corner in corners],
         "emphasis": {"disabled": True},
         "silent": True,
