@@ -15,6 +15,7 @@ from leaderboard.statistics import comparisons
 from leaderboard.web.formatting import grouped
 
 PER_PAGE: Final = 100
+MANY: Final = 10  # rows, from which on a search saves time
 ALL_COLUMNS: Final = "both"
 NAMES: Final = ("at", "sort", "columns", *filters.FILTERS, "page")
 """The parameters that a view of a board reads from its address."""
@@ -142,6 +143,7 @@ def tools(
         "faults": [sentence for name, sentence in faults.items() if name not in FILTERS],
         "kept": query.kept("sort", "at", "columns"),
         "is_filtered": query.filters.is_set,
+        "has_finder": board.n_in_all >= MANY or bool(asked.keys() & FILTERS.keys()),
         "chips": [
             (f"{label}: {_words(name, query.given[name])}", query.href(**{name: ""}))
             for name, each in FILTERS.items()

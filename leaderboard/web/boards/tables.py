@@ -129,7 +129,8 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
     """The board, ready to be drawn; its links keep what else the address asks for."""
     names = board.rules.names_of(query.columns)
     is_of_one = len(grouped_names(names)) == 1
-    scales = _scales(board.entries, names if is_of_one else names[:1])
+    has_intervals = any(ends_of(entry, name) for entry in board.entries for name in names)
+    scales = _scales(board.entries, names if is_of_one and has_intervals else names[:1])
     pages = Paginator(board.entries, PER_PAGE).get_page(query.page)
     sources = sorted({entry.source: entry.paper_url for entry in pages.object_list if entry.source}.items())
     numbers = {citation: i for i, (citation, _) in enumerate(sources, 1)}
@@ -165,9 +166,9 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
         sources=sources,
         ttc_ranges=counted_ranges(board.rules, counts),
         pages=pages,
-        has_intervals=bool(scales),
+        has_intervals=has_intervals,
         can_compare=is_present and sum(row.can_be_compared for row in rows) > 1,
-        reason=_reason(board, has_intervals=bool(scales)),
+        reason=_reason(board, has_intervals=has_intervals),
         floor=floor_sentence(edition.floor, decimals=edition.decimals) if edition else "",
     )
 
@@ -199,7 +200,7 @@ def _reason(board: Board, *, has_intervals: bool) -> str:
 
 
 def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, WhiskerScale]:
-    """One scale for each of these columns that has an interval, the same for all rows of all pages."""
+    """One scale for each of these columns, the same for all rows of all pages."""
     scales = {}
     for name in names:
         values = [(value, entry) for entry in entries if (value := entry.scores[name]) is not None]
@@ -226,12 +227,12 @@ def counted_ranges(rules: Protocol, counts: Mapping[str, int]) -> list[tuple[TTC
 
 
 def rank_range(entry: Entry) -> str:
-    """Return the ranks that an entry may have at 95 %, for behind its rank; empty where not known."""
+    """Return the ranks that an entry may have at 95 %, for behind its rank; empty where it is the rank alone."""
     interval = entry.intervals.get(PRIMARY, ConfidenceInterval())
     if interval.rank_low is None or interval.rank_high is None:
         return ""
-    if interval.rank_low == interval.rank_high:
-        return f"({interval.rank_low})"
+    if interval.rank_low == interval.rank_high == entry.rank:
+        return ""
     return f"({interval.rank_low}–{interval.rank_high})"
 
 

@@ -23,6 +23,8 @@ _BEYOND: Final = 86.0
 _LABEL_GAP: Final = 24.0
 _STEPS: Final = (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 
+_TICK: Final = '<line class="tick" x1="{0}%" x2="{0}%" y1="32%" y2="68%"/>'
+
 Ends = tuple[float, float]
 
 
@@ -84,23 +86,23 @@ class WhiskerScale:
 
 
 def scale_of(values: Iterable[float], intervals: Iterable[Ends], *, best: Ends | None) -> WhiskerScale | None:
-    """A scale that shows most of these values; None where none of them has an interval.
+    """A scale that shows most of these values; None where there are fewer than two.
 
     >>> scale_of([10.0, 11.0, 12.0, 13.0, 900.0], [(9.5, 10.5)], best=(9.5, 10.5))
     WhiskerScale(low=9.5, high=13.0, best=(9.5, 10.5))
     """
     ordered, ends = sorted(values), list(intervals)
-    if not ordered or not ends:
+    if len(ordered) < 2:
         return None
     # A little beyond the last of most: a row that ends close to it is shown as well.
     limit = _ROOM * ordered[math.ceil(_MOST * len(ordered)) - 1]
-    low = min(ordered[0], *(low for low, _ in ends))
+    low = min([ordered[0], *(low for low, _ in ends)])
     high = max(value for value in [*ordered, *(high for _, high in ends)] if value <= limit)
     return WhiskerScale(low, max(high, low + 1e-9), best)
 
 
 def whisker(scale: WhiskerScale, value: float, ends: Ends | None) -> SafeString:
-    """A value as a dot on its interval, or as a ring where it has none; dashes where it is off the scale."""
+    """A value as a tick on its interval, or as a ring where it has none; dashes where it is off the scale."""
     parts = [_band(scale)]
     if ends is not None and ends[0] <= scale.high:
         left, right = map(scale.percent, ends)
@@ -108,10 +110,10 @@ def whisker(scale: WhiskerScale, value: float, ends: Ends | None) -> SafeString:
     if value > scale.high:
         parts.append(_line("beyond", _BEYOND, 100.0))
     else:
-        css = "ring" if ends is None else "dot"
-        parts.append(
-            format_html('<circle class="{}" cx="{}%" cy="50%" r="3.4"/>', css, f"{scale.percent(value):g}")
-        )
+        at = f"{scale.percent(value):g}"
+        # Narrower than a dot would be, so that a short interval is seen on both sides of it.
+        mark = '<circle class="ring" cx="{0}%" cy="50%" r="3.4"/>' if ends is None else _TICK
+        parts.append(format_html(mark, at))
     return _svg("whisker", parts)
 
 

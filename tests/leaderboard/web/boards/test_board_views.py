@@ -41,13 +41,13 @@ def test_values_have_intervals_ranks_have_ranges_and_what_is_with_the_best_is_ma
     low, high = (float(end) for end in cell.one("span", class_="spoken").text.split(" to "))
     assert low < float(row.all("td", class_="primary")[0].text.split()[0]) < high
     assert cell.one("svg").attributes["aria-hidden"] == "true"
-    assert cell.attributes["title"] == f"95 % confidence interval: {low:.1f} to {high:.1f}"
+    assert cell.attributes["title"] == f"95% confidence interval: {low:.1f} to {high:.1f}"
     assert row.one("td", class_="rank").one("span", class_="range").text.endswith(")")
     assert all("title" in each.attributes for each in row.all("td", class_="wide"))
     for cell in root.one("tbody").all("td", class_="with-best"):
         assert ", statistically tied for best in its column (95 % confidence)" in cell.text
     legend = root.one("details", class_="legend").text
-    assert re.search(r"values with 95 % confidence intervals \(bootstrap over [\d,]+ recordings\)", legend)
+    assert re.search(r"values with 95% confidence intervals \(bootstrap over [\d,]+ recordings\)", legend)
     assert "Rows quoted from papers (rings) have no confidence interval" in legend
     published = row_of(root, "Deep Scale")
     assert "papers do not report" in published.one("td", class_="interval").attributes["title"]
