@@ -15,6 +15,7 @@ from leaderboard.editions import history
 from leaderboard.models import Edition, Split
 from leaderboard.web.boards import board_query, edition_tables, export_views, tables
 from leaderboard.web.boards.board_query import BoardQuery, tools
+from leaderboard.web.boards.rank_ladder import rank_ladder
 from leaderboard.web.lookups import split_or_404
 
 MAIN_SPLIT = "test"
@@ -50,6 +51,7 @@ def draw_board(
             faults=faults,
             latest_day=now.date() if edition is None and split.current_edition else None,
         ),
+        "ladder": rank_ladder(shown.unfiltered, primary=shown.rules.score_names[0]),
         "exports": export_views.offers(shown, edition, query),
         "n_withdrawn": sum(entry.withdrawn_at is not None for entry in shown.unfiltered),
     }

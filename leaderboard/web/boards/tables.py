@@ -227,7 +227,7 @@ def counted_ranges(rules: Protocol, counts: Mapping[str, int]) -> list[tuple[TTC
 
 
 def rank_range(entry: Entry) -> str:
-    """Return the ranks that an entry may have at 95 %, for behind its rank; empty where it is the rank alone."""
+    """Return the ranks that an entry may have at 95 %; empty where its rank is the only one."""
     interval = entry.intervals.get(PRIMARY, ConfidenceInterval())
     if interval.rank_low is None or interval.rank_high is None:
         return ""
