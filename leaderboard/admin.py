@@ -20,22 +20,17 @@ class ReadOnlyAdmin(admin.ModelAdmin):
     """Shows rows, changes none. `docs/maintainers.md` says where each thing is changed."""
 
     def has_add_permission(self, request: HttpRequest) -> bool:
-        """Never."""
         return False
 
     def has_change_permission(self, request: HttpRequest, obj: Model | None = None) -> bool:
-        """Never."""
         return False
 
     def has_delete_permission(self, request: HttpRequest, obj: Model | None = None) -> bool:
-        """Never."""
         return False
 
 
 @admin.register(User)
 class UserAdmin(ReadOnlyAdmin):
-    """Accounts, and who is a maintainer."""
-
     ordering = ["email"]
     list_display = ["email", "name", "is_staff", "is_active", "date_joined"]
     list_filter = ["is_staff", "is_active"]
@@ -45,8 +40,6 @@ class UserAdmin(ReadOnlyAdmin):
 
 @admin.register(EmailAddress)
 class EmailAddressAdmin(ReadOnlyAdmin):
-    """All addresses of accounts, and whether they are proved."""
-
     list_display = ["email", "user", "primary", "verified"]
     search_fields = ["email", "user__email"]
     list_select_related = ["user"]
@@ -54,8 +47,6 @@ class EmailAddressAdmin(ReadOnlyAdmin):
 
 @admin.register(Invitation)
 class InvitationAdmin(ReadOnlyAdmin):
-    """Invitations, without their secrets."""
-
     list_display = [
         *("team", "created_by", "created_at", "expires_at"),
         *("accepted_by", "accepted_at", "revoked_at"),
@@ -67,8 +58,6 @@ class InvitationAdmin(ReadOnlyAdmin):
 
 @admin.register(ApiToken)
 class ApiTokenAdmin(ReadOnlyAdmin):
-    """Tokens, without their secrets."""
-
     list_display = ["name", "token_key", "user", "created", "expiry", "last_used_at", "revoked_at"]
     fields = [
         *("name", "token_key", "user", "may_read", "may_submit", "split"),

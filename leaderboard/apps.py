@@ -5,13 +5,11 @@ from django.core import checks
 
 
 class LeaderboardConfig(AppConfig):
-    """Everything that the leaderboard remembers and shows."""
-
     name = "leaderboard"
     verbose_name = "TSTTC leaderboard"
 
     def ready(self) -> None:
-        """Register the system checks; only now can what they look at be imported."""
+        # Only now can the modules of the system checks be imported.
         from leaderboard.ops import deployment  # noqa: PLC0415 - needs the models
         from leaderboard.pages import texts  # noqa: PLC0415 - needs the models
         from leaderboard.submissions import receipts  # noqa: PLC0415 - needs the models

@@ -1,9 +1,4 @@
-"""The audit log: who did what to what, when. Rows are only added, and soon sealed into a chain of hashes.
-
-A verb writes its event in its own transaction and waits for nobody. The sweep seals what is not sealed yet:
-it binds each event to the one before it by its hash. What holds until then says
-`docs/adr/0032-the-sweep-seals-the-audit-trail.md`.
-"""
+"""The audit log: who did what, and when. Rows are only added, and chained by hashes later (ADR 32)."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -33,11 +28,10 @@ def record(
     details: Mapping[str, Any] | None = None,
     names: Mapping[str, str] | None = None,
 ) -> AuditEvent:
-    """Write one action. Call it inside the transaction of the action itself: both happen, or neither.
+    """Write one action, in the transaction of the action itself.
 
-    `names`, what people call themselves and their work, stand in a table where they can be blanked. `details`
-    hold neither those nor addresses, secrets, or values of a hidden ground truth. Raises `TypeError` for
-    others than texts, whole numbers, truth values, None, and lists and mappings of them.
+    `names` can be blanked later; `details` hold no names, addresses, secrets or hidden values.
+    Raises `TypeError` for what is not JSON.
     """
     noun_id = _storable(str(noun_id))
     texts = {
@@ -74,7 +68,6 @@ def record_many(actions: Iterable[tuple[str, str, object, Mapping[str, Any]]]) -
 
 
 def _plain(value: Any) -> Any:
-    """A copy of what every database gives back as it was."""
     if isinstance(value, str):
         return _storable(value)
     if value is None or isinstance(value, bool | int):
@@ -87,7 +80,6 @@ def _plain(value: Any) -> Any:
 
 
 def _storable(text: str) -> str:
-    """The text without what PostgreSQL cannot keep: NUL and lone surrogates."""
     return text.replace("\x00", "�").encode("utf-8", "replace").decode()
 
 
@@ -95,10 +87,7 @@ def _storable(text: str) -> str:
 
 
 def seal() -> int:
-    """Seal every event that is committed and not sealed yet. Returns how many; 0 if another worker is at it.
-
-    Whatever its id and its moment, an event that was committed late is sealed when it is found.
-    """
+    """Seal every event that is committed and not sealed yet. Returns how many; 0 if another worker seals."""
     SweepBeat.objects.get_or_create(pk=SweepBeat.THE_ONE)
     n_sealed = 0
     while n_now := _seal_some():

@@ -1,8 +1,4 @@
-"""Versions of boards: a number for each split that rises with every public change.
-
-Whoever keeps a copy of a board (see `boards.snapshots`) knows by this number whether it still holds.
-It is raised inside the transaction that makes the change, so nobody ever sees the one without the other.
-"""
+"""Versions of boards: a number for each split, raised in the transaction of every public change."""
 
 import uuid
 from collections.abc import Iterable
@@ -27,10 +23,7 @@ _CHECK_AND_LOCK = f"SET CONSTRAINTS ALL IMMEDIATE; SELECT pg_advisory_xact_lock(
 
 
 def bump(*split_ids: str) -> None:
-    """Raise the version of these splits' boards. Call it in the transaction of the change.
-
-    Call it after all other writes: see `lock`.
-    """
+    """Raise the version of these splits' boards, after all other writes of the transaction (see `lock`)."""
     lock()
     for split_id in split_ids:
         if not BoardVersion.objects.filter(split=split_id).update(number=F("number") + 1):
@@ -40,10 +33,9 @@ def bump(*split_ids: str) -> None:
 
 
 def lock() -> None:
-    """Prevent other changes of boards until the transaction ends; call it where it ends soon.
+    """Prevent other changes of boards until the transaction ends.
 
-    Foreign keys of the rows written until now are checked before, since at COMMIT they would wait for rows
-    whose holder waits for this.
+    Foreign keys are checked first: at COMMIT they would wait for rows whose holder waits for this lock.
     """
     if not transaction.get_connection().in_atomic_block:
         raise RuntimeError("a board was changed outside of the transaction of the change")
@@ -70,10 +62,7 @@ def bump_all() -> None:
 
 
 def bump_passed_deadlines(*, now: datetime) -> int:
-    """Bump each split that has opened or closed since, or whose announcement has ended.
-
-    Returns how many were bumped.
-    """
+    """Bump each split that has opened or closed since, or whose announcement has ended. Returns how many."""
     n_bumped = 0
     site_ends_at = PageVersion.announcement().values_list("ends_at", flat=True).first()
     for split in Split.objects.all():
@@ -89,7 +78,7 @@ def bump_passed_deadlines(*, now: datetime) -> int:
 
 
 def bump_for_methods(method_ids: Iterable[uuid.UUID]) -> None:
-    """The same for the splits that these methods have submissions to."""
+    """Bump the splits that these methods have submissions to."""
     methods = list(method_ids)
     submissions = Submission.objects.filter(method__in=methods)
     split_ids = sorted(set(submissions.order_by().values_list("split", flat=True).distinct()))
@@ -101,10 +90,7 @@ def bump_for_methods(method_ids: Iterable[uuid.UUID]) -> None:
 
 
 def bump_for_evaluations(evaluation_ids: Iterable[uuid.UUID]) -> None:
-    """Bump the splits whose public boards show these evaluations, just decided.
-
-    For private methods and editions in preparation only workers are notified.
-    """
+    """Bump the splits whose public boards show these evaluations; else notify workers alone."""
     # Before looking who is private: whoever shows a method holds this until it is shown.
     lock()
     shown = Evaluation.objects.filter(pk__in=list(evaluation_ids), edition__published_at__isnull=False)

@@ -31,13 +31,12 @@ def use_own_logging(**_: object) -> None:
 
 @worker_init.connect  # before the processes that run tasks are forked, which inherit it
 def keep_secrets_from_readers(**_: object) -> None:
-    """Refuse other processes of this user, readers of files among them, a worker's memory and secrets."""
     keep_memory_private()
 
 
 @worker_process_init.connect  # Celery has no other door into the processes that run tasks
 def start_poller(**_: object) -> None:
-    """Start this process's pollers, so that queued work is found with no broker at all."""
+    """Start this process's pollers, which find queued work without a broker."""
     from leaderboard.upkeep.pollers import start_pollers, stop_pollers  # noqa: PLC0415 - needs the apps
 
     pollers = start_pollers(rng=random.Random())  # noqa: S311 - jitter, not a secret

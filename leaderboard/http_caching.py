@@ -1,7 +1,4 @@
-"""What a cache may keep of a view's answer, and answers to conditional requests: for pages and API alike.
-
-`leaderboard/web/middleware/public_answers.py` reads the mark of what a cache may keep for anonymous readers.
-"""
+"""What a cache may keep of a view's answer, and answers to conditional requests: for pages and API alike."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -16,10 +13,7 @@ _MARK: Final = "is_kept"
 
 
 def cacheable(view: Callable[P, R]) -> Callable[P, R]:
-    """What this view answers anybody depends on the known part of its address and on the boards' numbers.
-
-    Of an address that anybody asks for, the view sees what is known alone.
-    """
+    """Mark a view whose answer depends only on the known part of its address and on the boards' versions."""
 
     @wraps(view)
     def marked(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -36,7 +30,7 @@ def cacheable(view: Callable[P, R]) -> Callable[P, R]:
 
 
 def is_cacheable(response: Any) -> bool:
-    """Whether the view that made it says so."""
+    """Tell whether the view is marked as cacheable."""
     return getattr(response, _MARK, False) is True
 
 

@@ -1,8 +1,7 @@
-"""All settings, read from the environment.
+"""All settings, read from the environment and described in `docs/operations.md`.
 
-Two profiles: `embedded` (the default: SQLite, no broker, everything below `var/`; what `make demo` and the
-tests use) and `production`, which guesses nothing: what it needs and does not find is an error.
-Every variable is described in `docs/operations.md`.
+Two profiles: `embedded` (the default: SQLite, no broker, everything below `var/`) and `production`, in which
+a missing variable is an error.
 """
 
 import logging

@@ -22,6 +22,5 @@ def nudge() -> None:
 
 @shared_task(name="leaderboard.tasks.work_off")
 def work_off() -> None:
-    """Do what waits behind submissions: intervals, comparisons, analyses."""
     close_old_connections()
     backlog.work_off(now=timezone.now(), rng=random.Random())  # noqa: S311 - jitter, not a secret

@@ -1,9 +1,4 @@
-"""Make a backup: the tables of one moment first, then every file that they name.
-
-Files are written before the rows that name them and are never changed, so the files of a later moment have
-all that the rows name. Nothing has to be stopped. A folder that has a backup already is brought up to date:
-only files that are not there yet are copied.
-"""
+"""Make a backup: the tables of one moment, then every file that they name and that the folder lacks."""
 
 import os
 import shutil
@@ -27,8 +22,7 @@ _KEY = "TSTTC_RECEIPT_KEY"
 def make(*, into: str, now: datetime) -> Contents:
     """Write a backup of the whole site into a folder that is empty or has an earlier one.
 
-    Files that rows name and that are lost are in `missing`; everything else is there. Raises `NoBackup`, and
-    `OSError` where a file cannot be read or written: an earlier backup in the folder then stays as it was.
+    Lost files are in `missing`. Raises `NoBackup`, and `OSError`; an earlier backup then stays as it was.
     """
     if environment.PRODUCTION and not os.environ.get(_KEY):
         raise NoBackup(f"{_KEY} is not set; expected it here too, since its public half is in the backup.")
@@ -74,7 +68,7 @@ def make(*, into: str, now: datetime) -> Contents:
 
 
 def _former(folder: Path) -> Mapping[str, str]:
-    """The digests of the files of an earlier backup there. Raises `NoBackup` for another folder."""
+    """Read the digests of an earlier backup. Raises `NoBackup` for another folder."""
     if (folder / contents.LIST).exists():
         return Contents.read(folder).files
     ours = {contents.FILES, contents.GROUND_TRUTH}

@@ -34,7 +34,7 @@ class NoBackup(Exception):
 
 @dataclass(frozen=True)
 class Contents:
-    """What a backup says of itself, in `backup.json`; digests are of the bytes, by path."""
+    """What a backup says of itself in `backup.json`; digests by path."""
 
     format: int
     made_at: str
@@ -50,13 +50,12 @@ class Contents:
     audit: str
 
     def write(self, folder: Path) -> None:
-        """Put it into the folder, which is a backup from this moment on."""
         with files.replacing(folder / LIST) as path:
             path.write_text(json.dumps(asdict(self), indent=1) + "\n", encoding="utf-8")
 
     @classmethod
     def read(cls, folder: Path) -> "Contents":
-        """What a folder holds. Raises `NoBackup`."""
+        """Read the list of a folder. Raises `NoBackup`."""
         path = folder / LIST
         try:
             document = json.loads(path.read_text(encoding="utf-8"))
@@ -73,10 +72,7 @@ class Contents:
             raise NoBackup(f"{path} is damaged; expected the list that `manage.py backup` wrote.") from fault
 
     def require_names_inside(self, path: Path) -> None:
-        """Refuse a name that leads out of its directory, so that a changed list cannot write anywhere.
-
-        Raises `NoBackup`.
-        """
+        """Refuse a name that leads out of its directory, so that a changed list cannot write elsewhere."""
         for name in (self.database, *self.files, *self.ground_truth):
             if name in {"", "."} or "\0" in name or name.startswith("/") or ".." in Path(name).parts:
                 raise NoBackup(
@@ -95,7 +91,7 @@ def folder_of(text: str) -> Path:
 
 
 def digest_of(file: IO[bytes]) -> str:
-    """The SHA-256 of what is left to read, from whatever store it comes."""
+    """Return the SHA-256 of what is left to read."""
     digest = hashlib.sha256()
     while chunk := file.read(CHUNK_BYTES):
         digest.update(chunk)
@@ -157,11 +153,9 @@ def board_digests() -> dict[str, str]:
 
 
 def applied_migrations() -> list[list[str]]:
-    """The migrations that the database has, as app and name."""
     return sorted([app, name] for app, name in MigrationRecorder(connection).applied_migrations())
 
 
 def listed(names: list[str]) -> str:
-    """The first few, one a line, and how many more."""
     rest = [f"… and {len(names) - _SHOWN:,} more"] if len(names) > _SHOWN else []
     return "\n".join(f"  {line}" for line in [*names[:_SHOWN], *rest])

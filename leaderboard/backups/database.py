@@ -89,10 +89,7 @@ def require_known(kept: Contents) -> None:
 
 
 def load(path: Path) -> None:
-    """Put the rows into a fresh database, as its owner, all or none; then bring it to this version.
-
-    Raises `NoBackup`.
-    """
+    """Put the rows into a fresh database, all or none, then migrate it. Raises `NoBackup`."""
     connection.ensure_connection()
     if connection.vendor == "sqlite":
         with closing(sqlite3.connect(path)) as source:
@@ -105,7 +102,6 @@ def load(path: Path) -> None:
 
 
 def _run(program: str, *arguments: str) -> None:
-    """Run a client program of PostgreSQL on the database of the site. Raises `NoBackup`."""
     # As for dbshell. Everybody can read a command line: the password is among the variables.
     (_, *options, name), variables = connection.client.settings_to_cmd_args_env(connection.settings_dict, [])
     try:

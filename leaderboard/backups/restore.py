@@ -18,7 +18,7 @@ from leaderboard.submissions import receipts
 
 @dataclass(frozen=True)
 class Restored:
-    """What was restored; every digest is the same."""
+    """What was restored."""
 
     contents: Contents
     n_boards: int  # boards that were compared: none where this version is later than the backup's
@@ -28,8 +28,7 @@ class Restored:
 def restore(*, source: str) -> Restored:
     """Put a backup into a fresh database, file store and ground-truth directory, and verify each of them.
 
-    The database comes last, in one transaction, so a restoration that was interrupted is simply begun again.
-    Raises `NoBackup`; before the first byte is written where the backup is damaged or the place is not fresh.
+    The database comes last, so an interrupted restoration can be repeated. Raises `NoBackup`.
     """
     folder = contents.folder_of(source)
     kept = Contents.read(folder)
@@ -50,7 +49,6 @@ def restore(*, source: str) -> Restored:
 
 
 def _require_whole(folder: Path, kept: Contents) -> None:
-    """Every file of the backup has the bytes that it had when it was made."""
     wanted = {
         kept.database: kept.database_sha256,
         **{f"{contents.FILES}/{name}": digest for name, digest in kept.files.items()},
@@ -65,7 +63,7 @@ def _require_whole(folder: Path, kept: Contents) -> None:
 
 
 def _require_no_others(private: Path, kept: Contents) -> None:
-    """The directory has nothing that the backup would replace: a secret of another site, say."""
+    # A secret of another site would be replaced.
     for path in contents.private_files():
         if contents.digest_at(path) != kept.ground_truth.get(path.name):
             raise NoBackup(
@@ -75,7 +73,7 @@ def _require_no_others(private: Path, kept: Contents) -> None:
 
 
 def _verified_boards(kept: Contents) -> int:
-    """Hold files, audit log and boards against the backup. Returns how many boards; raises `NoBackup`."""
+    """Compare files, audit log and boards with the backup. Returns how many boards; raises `NoBackup`."""
     faults = []
     for name, digest in kept.files.items():
         with files.store().open(name, "rb") as file:

@@ -1,4 +1,1 @@
-"""Boards: the rows of a split in one edition, now or as of a time: ranking, filters, what is kept of them.
-
-Scoring, exports, methods and everything above them import this room; it knows none of them.
-"""
+"""Boards: the rows of a split in one edition, now or as of a time: ranking, filters, what is kept of them."""

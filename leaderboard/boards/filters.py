@@ -9,7 +9,7 @@ from leaderboard.methods.details import DETAILS, MAX_FILTER_TEXT, YES_NO, Detail
 
 
 class BadFilter(ValueError):
-    """A filter has a value that it does not take. `field` is its name."""
+    """A filter has a value that it does not take."""
 
     def __init__(self, field: str, given: str, expected: str) -> None:
         super().__init__(f"The filter '{field}' is {given[:60]!r}; expected {expected}.")
@@ -18,7 +18,7 @@ class BadFilter(ValueError):
 
 @dataclass(frozen=True)
 class Filter:
-    """One filter: its kind, what pages call it, an example, and the value that a row states."""
+    """A filter: its kind, label, example, and the value that a row states."""
 
     kind: Kind
     label: str
@@ -26,7 +26,7 @@ class Filter:
     example: str = ""
 
     def parse(self, name: str, text: str) -> Any:
-        """The value that a text asks for. Raises `BadFilter`."""
+        """Convert the text of a query. Raises `BadFilter`."""
         if self.kind.is_free_text and len(text) > MAX_FILTER_TEXT:
             expected = f"at most {MAX_FILTER_TEXT} characters, found {len(text)}"
             raise BadFilter(name, text, expected)
@@ -53,17 +53,16 @@ FILTERS: Mapping[str, Filter] = {
 
 @dataclass(frozen=True)
 class Filters:
-    """What a row has to state to be shown, by the names of filters. An empty one admits every row."""
+    """Values that a row must have to be shown, by filter."""
 
     wanted: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def is_set(self) -> bool:
-        """Whether any filter is set."""
         return bool(self.wanted)
 
     def admits(self, entry: Entry) -> bool:
-        """Whether the row passes all filters, by the values that the reader sees in it."""
+        """Tell whether the row passes all filters, by the values that the reader sees."""
         return all(
             FILTERS[name].kind.admits(value, FILTERS[name].stated(entry))
             for name, value in self.wanted.items()
@@ -71,9 +70,6 @@ class Filters:
 
 
 def parse(query: Mapping[str, str]) -> Filters:
-    """The filters that an address names; empty values are none, and other names are not looked at.
-
-    Raises `BadFilter`.
-    """
+    """Read the filters of a query; skip empty values and other names. Raises `BadFilter`."""
     given = {name: query[name].strip() for name in FILTERS if query.get(name, "").strip()}
     return Filters({name: FILTERS[name].parse(name, text) for name, text in given.items()})

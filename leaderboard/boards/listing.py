@@ -52,8 +52,6 @@ SORTS = (*SORTABLE, *(f"-{name}" for name in SORTABLE))
 
 
 class UnknownColumn(ValueError):
-    """The board has no such column to sort by."""
-
     field = "sort"
 
     def __init__(self, column: str, *, known: Sequence[str]) -> None:
@@ -76,7 +74,7 @@ class BadTime(ValueError):
 
 @dataclass(frozen=True)
 class Board:
-    """A ranked board: one split, one edition, one point in time. `entries` are those that fit the filters."""
+    """A ranked board. `entries` are those that fit the filters."""
 
     split: Split
     edition: Edition | None
@@ -93,17 +91,15 @@ class Board:
 
     @property
     def n_in_all(self) -> int:
-        """How many rows there are before the filters."""
         return len(self.unfiltered)
 
     @property
     def rules(self) -> Protocol:
-        """The protocol that its numbers follow."""
         return rules_of(self.edition)
 
 
 def rules_of(edition: Edition | None) -> Protocol:
-    """The protocol of a board: its edition's, and the default one before there is any."""
+    """Return the protocol of an edition, or the default one before there is any."""
     return edition.rules if edition else get_protocol(DEFAULT_PROTOCOL)
 
 
@@ -131,13 +127,12 @@ def board(
     filters: Filters | None = None,
     read: "Callable[..., tuple[Entry, ...]] | None" = None,
 ) -> Board:
-    """The board of a split in one edition (the published one unless named), as `viewer` may see it.
+    """Return the board of a split in one edition (default: the published one), as `viewer` may see it.
 
-    With `at` the board as it stood then, with methods told as everybody sees them now. Ranks are by published
-    MiD among everything that everybody sees, whatever the filters; ties share a rank. Each method is
-    represented by the best of its active submissions; one whose submissions were all withdrawn leaves a row
-    without values. Rows that only the viewer's own team sees carry the rank that they would have.
-    `read` gives the rows that everybody sees, in `public_rows`' place. Raises `UnknownColumn`.
+    `at` is a time in the past; visibility is always as of now. Ranks are by MiD among all public rows,
+    whatever the filters; ties share a rank. A method is represented by the best of its active submissions.
+    Rows that only the viewer's team sees carry the rank that they would have.
+    `read` replaces `public_rows`. Raises `UnknownColumn`.
     """
     edition = edition or (edition_at(split, at) if at else split.current_edition)
     require_column(sort, rules=rules_of(edition))
@@ -165,14 +160,13 @@ def board(
 
 
 def require_column(sort: str, *, rules: Protocol | None = None) -> None:
-    """Raise `UnknownColumn` for what a board of this protocol cannot be sorted by; without one, no board."""
+    """Raise `UnknownColumn` for what a board of this protocol cannot be sorted by."""
     known = (*TEXT_COLUMNS, *(rules.score_names if rules else known_names()))
     if sort.removeprefix("-") not in known:
         raise UnknownColumn(sort, known=known)
 
 
 def _n_left_behind(edition: Edition) -> int:
-    """Active submissions of shown methods that another published edition of the split has scored."""
     scored = Evaluation.objects.filter(status=Status.SCORED, edition__published_at__isnull=False)
     return (
         Submission.objects.active()
@@ -183,7 +177,7 @@ def _n_left_behind(edition: Edition) -> int:
 
 
 def edition_at(split: Split, at: datetime) -> Edition | None:
-    """The edition that was the board at that time."""
+    """Return the edition that was published at that time."""
     publication = (
         split.publications.filter(at__lte=at)
         .select_related("edition__ground_truth")
@@ -203,9 +197,9 @@ def public_rows(
     at: datetime | None = None,
     assuming_visible: Method | None = None,
 ) -> tuple[Entry, ...]:
-    """The rows that everybody sees, ranked and marked, untouched by readers and private methods.
+    """Return the rows that everybody sees, ranked and marked.
 
-    `assuming_visible` is a method with a visibility that it does not have yet: the rows would be these then.
+    `assuming_visible` is a method with a visibility that it does not have yet, for a preview.
     """
     quoted = PublishedResult.objects.on_board(split, edition, at=at)
     entries = [quoted_entry(result, rules=rules_of(edition)) for result in quoted]
@@ -227,7 +221,7 @@ def _best_of_each(
     at: datetime | None,
     assuming_visible: Method | None = None,
 ) -> list[Entry]:
-    """One row for each of these methods, without its rank: the best of its submissions, masked if need be."""
+    """Return one row without rank for each method: its best submission, masked if need be."""
     scored_rows = Evaluation.objects.filter(
         edition=edition, status=Status.SCORED, submission__method__in=methods, submission__hidden_at=None
     )
@@ -264,7 +258,6 @@ def _best_of_each(
 def _with_scores(
     rows: "QuerySet[Evaluation]", *, edition: Edition, has_ranges: bool
 ) -> Iterator[tuple[Evaluation, Scored]]:
-    """Each evaluation with its scores."""
     # In an order of their own, so that bytes keep theirs; before their scores, which are written with them.
     evaluations = list(rows.order_by("pk"))
     scored = scored_in(
@@ -277,16 +270,13 @@ def _with_scores(
 
 
 def _finished_by(at: datetime, *, method: str) -> Q:
-    """What had been decided by then, of anonymous methods by the end of that day."""
+    # Anonymous methods count from the end of the day: its exact time could give them away.
     is_masked = Q(**{f"{method}__visibility": Visibility.ANONYMOUS})
     return Q(finished_at__lte=at) | is_masked & Q(finished_at__lte=days.known_until(at, is_masked=True))
 
 
 def unscorable_in(edition: Edition, *, split: Split) -> dict[UUID, str]:
-    """Submissions that a former edition scored and the published one rejects: its manifest has other keys.
-
-    By each the code of the reason.
-    """
+    """Return submissions that a former edition scored and the published one rejects, with their codes."""
     if split.current_edition_id in {None, edition.pk}:
         return {}
     rejected = Evaluation.objects.filter(
@@ -305,9 +295,9 @@ def _attempts(
     assuming_visible: Method | None = None,
     of_teams: bool = True,
 ) -> Mapping[UUID | None, int]:
-    """How many submissions were scored in a published edition, by method.
+    """Count the submissions scored in a published edition, by method.
 
-    A public method tells all that its team shows; another one, and each without `of_teams`, its own.
+    A public method counts all its team's shown ones with `of_teams`, any other method its own.
     """
     scored = Evaluation.objects.filter(
         submission=OuterRef("pk"), status=Status.SCORED, edition__published_at__isnull=False
@@ -341,10 +331,7 @@ def with_own(
     viewer: User | AnonymousUser,
     at: datetime | None = None,
 ) -> tuple[Entry, ...]:
-    """What everybody sees, for one reader: their team's rows marked and named, and its private ones added.
-
-    A private row has the rank that it would take; the others keep theirs.
-    """
+    """Name the rows of a reader's team, and add its private ones with the rank that they would have."""
     if not viewer.is_authenticated or edition is None:
         return tuple(shown)
     own = Method.objects.of(viewer).select_related("team")

@@ -16,16 +16,12 @@ _A_DAY_S: Final = 86_400
 
 
 def since(*, now: datetime) -> datetime:
-    """The end of the day that ranks are compared with."""
+    """Return the end of the day that ranks are compared with."""
     return datetime.combine((now - MONTH).astimezone(UTC).date(), time.max, tzinfo=UTC)
 
 
 def moved(board: Board, *, now: datetime) -> Mapping[UUID, int]:
-    """By method how many ranks it has risen in a month (fallen: below 0), if it was ranked then and is now.
-
-    Nothing for a board of the past or of a former edition, and none of a method that only its team sees.
-    Ranks of different editions are not compared.
-    """
+    """Return by how many ranks each method has risen in a month; fallen: below 0."""
     edition = board.edition
     if board.at is not None or edition is None or edition.pk != board.split.current_edition_id:
         return {}

@@ -19,7 +19,7 @@ def profile(*, method: Method, viewer: User | AnonymousUser) -> Profile:
 
 @dataclass(frozen=True)
 class Result:
-    """What a method achieved on one split: its row of the published board, and what was tried."""
+    """The row of a method on one published board, and its submissions."""
 
     split: Split
     edition: Edition
@@ -32,7 +32,7 @@ class Result:
 def results(
     *, method: Method, viewer: User | AnonymousUser, splits: Sequence[Split] | None = None
 ) -> tuple[Result, ...]:
-    """A result for each split on whose published board the viewer sees the method, in the splits' order.
+    """Return a result for each split on whose published board the viewer sees the method.
 
     `splits` are those of `snapshots.splits()`, where they are at hand.
     """

@@ -1,7 +1,6 @@
 """The row of a board, its rank, and the details of a method that a reader may see.
 
-Rows are made from evaluations and from results printed in papers. An anonymous method is masked here, once,
-for every page and format: whatever is made of an `Entry` or a `Profile` later cannot tell what neither holds.
+An anonymous method is masked here, once, for every page and format.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -33,7 +32,7 @@ _SHOWN_REASONS = ("missing-keys", "unknown-keys", "undefined-error")
 
 @dataclass(frozen=True)
 class Profile:
-    """The fields of a method that a reader sees: all of them, or those of an anonymous method."""
+    """The details of a method that a reader sees."""
 
     name: str
     team: str
@@ -45,7 +44,7 @@ class Profile:
 
 @dataclass(frozen=True, slots=True)
 class ConfidenceInterval:
-    """Where a value may lie, and its row in that column, at 95 %; None until a worker has computed it."""
+    """The 95 % confidence interval of a value, and its rank range; None until a worker has computed it."""
 
     low: float | None = None
     high: float | None = None
@@ -66,7 +65,7 @@ NO_RANGES: Final[KeptRanges] = {}
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One row of a board. `scores` has the names of its edition's protocol; None for no value."""
+    """A row of a board. `scores` has the names of its edition's protocol; None for no value."""
 
     kind: str  # "submission" or "published"
     method: str
@@ -105,22 +104,20 @@ class Entry:
 
     @property
     def is_unscorable(self) -> bool:
-        """Whether it stays in a former edition, because the published one cannot score its file."""
+        """Tell whether the published edition cannot score its file."""
         return bool(self.unscorable)
 
     @property
     def is_visible_to_all(self) -> bool:
-        """Whether everybody sees this row, be it under a pseudonym."""
         return self.visibility != Visibility.PRIVATE
 
     @property
     def listed_at(self) -> datetime | None:
-        """Since when the row can stand on the board: sent, and its method shown."""
+        """Return since when the row can be on the board: submitted, and its method shown."""
         return max((at for at in (self.date, self.shown_at) if at), default=None)
 
     @property
     def date_text(self) -> str:
-        """The date as shown: a day for submissions, a year for published rows."""
         return f"{self.date:%Y-%m-%d}" if self.date else str(self.year or "")
 
 
@@ -140,7 +137,7 @@ def profile_of(method: Method, *, is_masked: bool = False) -> Profile:
 
 
 def quoted_entry(result: PublishedResult, *, rules: Protocol) -> Entry:
-    """The row of a result that is printed in a paper, on a board of this protocol."""
+    """Make the row of a published result on a board of this protocol."""
     return Entry(
         kind="published",
         slug=result.slug,
@@ -170,7 +167,6 @@ def printed_decimals(values: Iterable[float | None]) -> int:
 
 
 def named(profile: Profile) -> dict[str, Any]:
-    """The fields of a row that say what the method is."""
     fields = {
         name: getattr(profile, name) for name in ("team", "description", "paper_url", "code_url", "details")
     }
@@ -186,7 +182,7 @@ def submitted_entry(
     withdrawn_at: datetime | None = None,
     unscorable: str = "",
 ) -> Entry:
-    """The row of a submission, as `profile` tells of its method; its edition publishes with `decimals`."""
+    """Make the row of a submission, with the printed `decimals` of its edition."""
     submission = evaluation.submission
     method = submission.method
     return Entry(
@@ -222,14 +218,12 @@ def public_reason(problems: Iterable[Mapping[str, str]]) -> str:
 
 
 class Scored(NamedTuple):
-    """The values of an evaluation by the names of its protocol, and the intervals of those that have one."""
-
     values: Mapping[str, float | None]
     intervals: Mapping[str, ConfidenceInterval]
 
 
 def _scored(cells: Mapping[str, tuple[float, ConfidenceInterval]], rules: Protocol) -> Scored:
-    """In the order of the protocol, so that a row has the same bytes whenever it is read."""
+    # In the order of the protocol, so that a row has the same bytes whenever it is read.
     return Scored(
         {name: cells[name][0] if name in cells else None for name in rules.score_names},
         {name: cells[name][1] for name in rules.score_names if name in cells and cells[name][1] != _UNKNOWN},
@@ -237,12 +231,11 @@ def _scored(cells: Mapping[str, tuple[float, ConfidenceInterval]], rules: Protoc
 
 
 def flat_scores(evaluation: Evaluation) -> Mapping[str, float | None]:
-    """The names of its protocol and their values; None where a TTC range is empty."""
+    """Return the scores by the names of the protocol; None where a TTC range is empty."""
     return scored_of(evaluation).values
 
 
 def scored_of(evaluation: Evaluation) -> Scored:
-    """The values of one evaluation with their confidence intervals, without rank ranges."""
     cells = {
         score_name(score.metric, score.ttc_range): (score.value, ConfidenceInterval(score.low, score.high))
         for score in evaluation.scores.all()
@@ -253,9 +246,9 @@ def scored_of(evaluation: Evaluation) -> Scored:
 def scored_in(
     edition: Edition, *, evaluations: Collection[UUID] | None = None, ranges: KeptRanges = NO_RANGES
 ) -> Mapping[UUID, Scored]:
-    """Values and intervals of every evaluation in an edition, or of these: one query.
+    """Return values and intervals of every evaluation in an edition, or of these, by one query.
 
-    With `ranges_in(edition)` also the rank ranges of the present entries.
+    `ranges_in(edition)` adds the rank ranges of the present entries.
     """
     rules, nothing = edition.rules, [None] * len(edition.rules.score_names)
     rows = Score.objects.filter(evaluation__edition=edition)
@@ -272,12 +265,12 @@ def scored_in(
 
 
 def ranges_in(edition: Edition) -> KeptRanges:
-    """The rank ranges of the entries that stand now, as they are kept."""
+    """Return the kept rank ranges of an edition."""
     return EditionRanges.objects.filter(edition=edition).values_list("ranges", flat=True).first() or NO_RANGES
 
 
 def placed(entry: Entry, rank: int | None) -> Entry:
-    """The row with its rank. A range that does not hold it is of the board before, and left out."""
+    """Give the row its rank; drop a rank range without it, which is of an earlier board."""
     interval = entry.intervals.get(PRIMARY, ConfidenceInterval())
     if rank is None or interval.rank_low is None or interval.rank_high is None:
         return replace(entry, rank=rank)
@@ -291,12 +284,12 @@ SortKey = tuple[bool, float, datetime]
 
 
 def key(value: float | None, submitted_at: datetime) -> SortKey:
-    """Of a method's submissions, the better first: a value before none, lower before higher, then earlier."""
+    """Sort a method's submissions: a value before none, lower before higher, then earlier."""
     return (value is None, value or 0.0, submitted_at)
 
 
 def in_ranks(entries: Sequence[Entry]) -> tuple[Entry, ...]:
-    """The same rows with their ranks, and with the best and the second of each column marked."""
+    """Rank the rows, and mark the best and the second of each column."""
     ranks = registry.rank([entry.scores[PRIMARY] for entry in entries])
     names = list(entries[0].scores) if entries else []
     marks = {name: registry.best_and_second([entry.scores[name] for entry in entries]) for name in names}
@@ -311,7 +304,7 @@ def in_ranks(entries: Sequence[Entry]) -> tuple[Entry, ...]:
 
 
 def listed(entries: Sequence[Entry], *, by: str) -> list[Entry]:
-    """In the order of one column; rows without a value come last, ties by rank, value and name."""
+    """Sort by one column; rows without a value come last, ties by rank, value and name."""
     column = by.removeprefix("-")
     in_rank_order = sorted(
         entries, key=lambda e: (e.rank or len(entries) + 1, e.scores[PRIMARY] or 0, e.method.casefold())

@@ -1,7 +1,6 @@
-"""What everybody sees of a board: read once for all readers, and kept by the number of its split.
+"""What everybody sees of a board: read once for all readers, and kept under its version.
 
-Each request reads the number (see `leaderboard/board_versions.py`), so what is kept under it is current. The
-rows are read as of one moment. A board as of a time is kept apart: anybody can ask for any number of times.
+A board as of a time has a cache of its own: anybody can ask for any number of times.
 """
 
 import threading
@@ -38,8 +37,6 @@ from leaderboard.models.methods import MethodQuerySet
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """One active submission of a method, with its overall scores."""
-
     method_id: UUID
     submission_id: UUID
     at: datetime
@@ -48,7 +45,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class CurrentBoard:
-    """What everybody sees of an edition: the rows, ranked, and everything that was tried, newest first."""
+    """The public rows of an edition, ranked, and its submissions, newest first."""
 
     entries: tuple[Entry, ...]
     attempts: tuple[Attempt, ...] = ()
@@ -63,17 +60,14 @@ _reading = threading.Lock()
 
 
 def splits() -> list[Split]:
-    """The splits that are not switched off, with their published editions and the numbers of their boards.
-
-    Archived ones come last. It is a whole page's first statement.
-    """
+    """Return the splits that are switched on, with published editions and versions; archived ones last."""
     rows = Split.objects.shown().order_by("position", "name").select_related("current_edition__ground_truth")
     rows = rows.annotate(**PageVersion.announcement_of_every_row(), board_number=F("board_version__number"))
     return sorted(rows, key=lambda split: split.is_archived)
 
 
 def splits_of(request: HttpRequest) -> list[Split]:
-    """The splits as in `splits`, read once a request."""
+    """Return `splits`, read once in a request."""
     cached: list[Split] | None = getattr(request, "splits", None)
     if cached is None:
         cached = splits()
@@ -82,7 +76,7 @@ def splits_of(request: HttpRequest) -> list[Split]:
 
 
 def site_line_of(splits: Sequence[Split], *, now: datetime) -> str:
-    """The announcement of the site, as `splits_of` has read it; empty once it has ended."""
+    """Return the announcement of the site; empty once it has ended."""
     for split in splits:
         ends_at: datetime | None = getattr(split, "site_line_ends_at", None)
         if ends_at is not None and now < ends_at:
@@ -91,7 +85,7 @@ def site_line_of(splits: Sequence[Split], *, now: datetime) -> str:
 
 
 def editions() -> "QuerySet[Edition]":
-    """Published editions of splits that are not switched off, with their boards' numbers; to be filtered."""
+    """Published editions of splits that are not switched off, with their boards' versions; to be filtered."""
     rows = (
         Edition.objects.filter(split__in=Split.objects.shown())
         .exclude(published_at=None)
@@ -101,7 +95,7 @@ def editions() -> "QuerySet[Edition]":
 
 
 def _number(split: Any, edition: Any) -> int:
-    """The number of a split's board, as of when one of the two was read; asks only if neither has it."""
+    """Return the version of a split's board, read with the split or the edition, or else now."""
     for row in (split, edition):
         if hasattr(row, "board_number"):
             return row.board_number or 0
@@ -124,8 +118,6 @@ board = partial(listing.board, read=_public_rows)
 
 
 def _as_of(split: Split, edition: Edition | None, at: datetime) -> tuple[Entry, ...]:
-    """The rows that everybody saw at that time."""
-
     def rows() -> CurrentBoard:
         return CurrentBoard(listing.public_rows(split=split, edition=edition, at=at))
 
@@ -134,18 +126,17 @@ def _as_of(split: Split, edition: Edition | None, at: datetime) -> tuple[Entry, 
 
 
 def shown(*, split: Split, edition: Edition) -> CurrentBoard:
-    """What everybody sees of an edition that is or was the board, as of now."""
+    """Return what everybody sees of a published edition, as of now."""
     return _kept(f"rows:{edition.pk}:{_number(split, edition)}", partial(_now, edition.pk), cache="boards")
 
 
 def shown_on(rows: Sequence[Split]) -> list[tuple[Split, CurrentBoard]]:
-    """What everybody sees of each of these splits' boards, where there is one; `rows` are of `splits()`."""
+    """Return what everybody sees of each board of these rows of `splits()`."""
     with_board = [(split, split.current_edition) for split in rows if split.current_edition is not None]
     return [(split, shown(split=split, edition=edition)) for split, edition in with_board]
 
 
 def _kept(key: str, read: Callable[[], CurrentBoard], *, cache: str) -> CurrentBoard:
-    """The cached board of a key, else read now. The key has the board's number, so a hit is current."""
     body: bytes | None = caches[cache].get(key)
     if body is None:
         with _reading:
@@ -160,7 +151,6 @@ def _encoded(read: Callable[[], CurrentBoard]) -> bytes:
 
 
 def _now(edition_id: int) -> CurrentBoard:
-    """The edition as the database has it at this moment."""
     edition = Edition.objects.select_related("split__current_edition", "ground_truth").get(pk=edition_id)
     entries = listing.public_rows(split=edition.split, edition=edition)
     return CurrentBoard(entries=entries, attempts=attempts(edition, methods=Method.objects.shown()))
@@ -168,7 +158,6 @@ def _now(edition_id: int) -> CurrentBoard:
 
 @contextmanager
 def _repeatable_read() -> Iterator[None]:
-    """Everything that is read within is of the same moment, whatever is committed meanwhile."""
     is_outermost = not connection.in_atomic_block
     with transaction.atomic():
         if is_outermost and connection.vendor == "postgresql":
@@ -179,7 +168,7 @@ def _repeatable_read() -> Iterator[None]:
 
 
 def attempts(edition: Edition, *, methods: MethodQuerySet) -> tuple[Attempt, ...]:
-    """The active, scored submissions of these methods, the newest first."""
+    """Return the active, scored submissions of these methods, the newest first."""
     rows = Score.objects.filter(
         evaluation__edition=edition,
         evaluation__status=Status.SCORED,

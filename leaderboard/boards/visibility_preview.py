@@ -13,7 +13,7 @@ from leaderboard.models import Edition, Method, Split, Visibility
 
 @dataclass(frozen=True)
 class BoardPreview:
-    """The row of one split's published board that everybody would see, and how it would stand there."""
+    """How a method would be on one split's published board."""
 
     split: Split
     edition: Edition
@@ -26,15 +26,13 @@ class BoardPreview:
 
 @dataclass(frozen=True)
 class RankChange:
-    """Another row of the board, and the rank that it would have then."""
-
     entry: Entry
     rank_after: int | None
 
 
 @dataclass(frozen=True)
 class VisibilityPreview:
-    """Exactly what everybody would see of a method."""
+    """What everybody would see of a method."""
 
     visibility: str
     profile: Profile
@@ -76,7 +74,6 @@ def preview(*, method: Method, visibility: str, now: datetime) -> VisibilityPrev
 
 
 def _public_others(method: Method) -> set[UUID]:
-    """The team's other methods that everybody sees under their names."""
     others = Method.objects.filter(team=method.team_id, visibility=Visibility.PUBLIC).exclude(pk=method.pk)
     return set(others.values_list("pk", flat=True))
 
@@ -84,7 +81,6 @@ def _public_others(method: Method) -> set[UUID]:
 def _rank_changes(
     before: Sequence[Entry], after: Sequence[Entry], *, method: Method
 ) -> tuple[RankChange, ...]:
-    """The other rows whose rank would change, in the order of their ranks now."""
     ranks = {_key(row): row.rank for row in after}
     moved = [
         RankChange(entry=row, rank_after=ranks[_key(row)])
@@ -95,5 +91,4 @@ def _rank_changes(
 
 
 def _key(row: Entry) -> tuple[UUID | None, str, str]:
-    """What a row is known by in two drawings of a board; a printed one has no id."""
     return (row.method_id, "", "") if row.method_id else (None, row.source, row.method)
