@@ -1,7 +1,6 @@
-"""The simulated split of the demo, and the runs whose files its teams submit: what ran, and its estimates.
+"""The simulated split of the demo, and the runs whose files its teams submit.
 
-`python -m leaderboard.demo.runs FOLDER [NAME …]` makes them anew, with the commands that the descriptions
-name; the frames in FOLDER take about 2 GB. Reading the estimates needs numpy alone.
+`python -m leaderboard.demo.runs FOLDER [NAME …]` makes the estimates again; the frames take about 2 GB.
 """
 
 import json
@@ -45,13 +44,12 @@ class Run:
 
     @property
     def command(self) -> str:
-        """The command that makes the file from the rendered frames."""
+        """Return the command that makes the file from the rendered frames."""
         options = "".join(f" --{name.replace('_', '-')} {value}" for name, value in self.parameters.items())
         return f"tsttc baseline run {self.method} frames/ --out {self.name}.json{options}"
 
     @property
     def path(self) -> Path:
-        """Where its estimates are kept."""
         return FOLDER / f"{self.name}.npz"
 
     def keep(self, scale_ratio: Floats) -> None:
@@ -62,7 +60,7 @@ class Run:
             np.savez_compressed(file, millionths=millionths)
 
     def kept(self) -> Floats:
-        """The estimates, (n,) in ascending anno_id; raises `OSError` where none are kept."""
+        """Read the estimates, (n,) in ascending anno_id. Raises `OSError` without any."""
         with self.path.open("rb") as file, np.load(file, allow_pickle=False) as store:
             # A scale ratio of 0 cannot be submitted.
             return np.maximum(np.asarray(store["millionths"], dtype=np.float64), 1) / 10**DECIMALS
@@ -82,7 +80,7 @@ RUNS = (
 
 
 def get_run(name: str) -> Run:
-    """The run of that name; raises `KeyError`."""
+    """Return the run of that name. Raises `KeyError`."""
     return {run.name: run for run in RUNS}[name]
 
 
@@ -90,7 +88,6 @@ SHAPE = simulation.SHAPES["test"]
 
 
 def demo_split() -> simulation.Split:
-    """The demo's split with the motion of its vehicles, from which its frames are rendered."""
     return simulation.split(
         rng=np.random.default_rng(SEED), n_sequences=N_SEQUENCES, n_recordings=N_RECORDINGS, shape=SHAPE
     )
@@ -99,16 +96,12 @@ def demo_split() -> simulation.Split:
 def simulate(
     *, rng: np.random.Generator, n_sequences: int = N_SEQUENCES, n_recordings: int = N_RECORDINGS
 ) -> evaluator.GroundTruth:
-    """Ground truth of tracks that are spread over recordings; the same generator gives the same values.
-
-    A track is a run of windows cut without overlap, as in the dataset, of a vehicle in one of the paper's six
-    driving scripts or in highway driving.
-    """
+    """Make ground truth of tracks spread over recordings; a track is cut into windows, as in the dataset."""
     return simulation.split(rng=rng, n_sequences=n_sequences, n_recordings=n_recordings, shape=SHAPE).truth
 
 
 def make(folder: Path, *, names: Sequence[str]) -> None:
-    """Render the frames in a folder, estimate with the runs of these names, and keep the estimates."""
+    """Render the frames in a folder, and keep the estimates of the runs of these names."""
     folder.mkdir(parents=True, exist_ok=True)
     runs = [get_run(name) for name in names or [run.name for run in RUNS]]
     for command in (FRAMES, *(run.command for run in runs)):

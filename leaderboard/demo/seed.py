@@ -1,8 +1,6 @@
-"""What the demo starts with: a split with simulated ground truth, three teams, and what they sent.
+"""Seed the demo: a split with simulated ground truth, three teams, and their submissions.
 
-The files are those of the project's baselines on rendered frames. Everything but the demo account's password
-comes from one fixed seed, and goes through the same functions as the real thing: the files are checked and
-scored by whatever worker finds them in the queue.
+All but the password comes from one fixed seed and goes through the functions that the site uses.
 """
 
 import secrets
@@ -42,7 +40,7 @@ _RENDERED = (
 
 @dataclass(frozen=True)
 class DemoEntry:
-    """One submission of the demo. Without a run, the file is one that has faults."""
+    """A submission of the demo; without a run, its file has faults."""
 
     team: str
     method: str
@@ -53,12 +51,10 @@ class DemoEntry:
 
     @property
     def email(self) -> str:
-        """The address of the account that sends it."""
         return TEAMS[self.team]
 
     @property
     def full_description(self) -> str:
-        """What the method does, and the commands that made its file."""
         if self.run is None:
             return self.description
         return f"{self.description} {_RENDERED}\n\nCommands:\n{FRAMES}\n{self.run.command}"
@@ -171,10 +167,9 @@ ENTRIES = (
 
 
 def seed(*, now: datetime, password_path: Path) -> str:
-    """Make whatever of the demo is missing; what is there stays. Returns the password of `DEMO_EMAIL`.
+    """Make what is missing of the demo. Returns the password of `DEMO_EMAIL`, kept at `password_path`.
 
-    `password_path` keeps it, readable by its owner only, so that it can be printed again. Raises
-    `Refused` where the split `demo` has other ground truth; nothing is submitted then.
+    Raises `Refused` where the split `demo` has other ground truth.
     """
     if not password_path.exists():
         password_path.touch(mode=0o600)
@@ -230,7 +225,7 @@ def _open_split(truth: evaluator.GroundTruth, *, now: datetime) -> None:
 
 
 def _submit(entry: DemoEntry, *, user: User, truth: evaluator.GroundTruth, now: datetime) -> None:
-    """Send the entry's file, and say and show of its method what the demo does: all of it, or nothing."""
+    """Send the entry's file, and edit and show its method: all or nothing."""
     data = predictions_file(entry, truth=truth)
     with transaction.atomic():
         request = intake.SubmissionRequest(
@@ -250,7 +245,7 @@ def _submit(entry: DemoEntry, *, user: User, truth: evaluator.GroundTruth, now: 
 
 
 def predictions_file(entry: DemoEntry, *, truth: evaluator.GroundTruth) -> bytes:
-    """The file that the entry's team sends; the same for the same truth."""
+    """Make the file that the entry's team sends."""
     manifest = truth.manifest
     if entry.run is None:
         return _file_with_faults(manifest)
@@ -263,7 +258,6 @@ def predictions_file(entry: DemoEntry, *, truth: evaluator.GroundTruth) -> bytes
 
 
 def _file_with_faults(manifest: evaluator.Manifest) -> bytes:
-    """A file whose sequences of the last recordings are missing, with a null and a NaN among its values."""
     values = dict.fromkeys(manifest.anno_id_keys[:-40], "10.0")
     values["17"] = "null"
     values["23"] = "NaN"

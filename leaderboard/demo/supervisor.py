@@ -1,4 +1,4 @@
-"""Keeps the demo's processes alive: starts them, restarts what dies, ends them together."""
+"""Start the demo's processes, restart those that die, and end them together."""
 
 import asyncio
 import contextlib
@@ -20,12 +20,12 @@ _PR_SET_PDEATHSIG = 1
 
 
 class StartFailed(RuntimeError):
-    """A process does not stay up; the text says which, and what it said last."""
+    """A process does not stay up; the text has its name and its last lines."""
 
 
 @dataclass
 class Process:
-    """One process that is meant to run. `log_path` takes what it prints."""
+    """A process to keep running; `log_path` takes its output."""
 
     name: str
     command: Sequence[str]
@@ -34,7 +34,7 @@ class Process:
     n_quick_deaths: int = field(default=0, init=False)
 
     async def run(self, stop: asyncio.Event) -> None:
-        """Keep it running until `stop`; then end it. Raises `StartFailed` if it dies again and again."""
+        """Keep it running until `stop`, then end it. Raises `StartFailed` if it dies again and again."""
         stopping = asyncio.create_task(stop.wait())
         while not stop.is_set():
             started_s = time.monotonic()
@@ -70,12 +70,11 @@ class Process:
 
 
 def _end_with_parent() -> None:
-    """In the child, before its program starts: ask the kernel for SIGTERM should the supervisor vanish."""
+    # Before the child's program starts: ask the kernel for SIGTERM should the supervisor vanish.
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 async def _end(child: asyncio.subprocess.Process) -> None:
-    """Ask the process to finish what it has in hand; after a while, end it and whatever it left behind."""
     if child.returncode is None:
         with contextlib.suppress(ProcessLookupError):
             child.terminate()
@@ -88,7 +87,6 @@ async def _end(child: asyncio.subprocess.Process) -> None:
 
 
 def port_is_free(host: str, port: int) -> bool:
-    """Whether a server could listen there."""
     with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -99,7 +97,7 @@ def port_is_free(host: str, port: int) -> bool:
 
 
 async def _listening(host: str, port: int) -> None:
-    """Return once something accepts connections there. Raises `TimeoutError`."""
+    """Wait until something accepts connections. Raises `TimeoutError`."""
     async with asyncio.timeout(TIMEOUT_S):
         while True:
             try:
@@ -113,10 +111,9 @@ async def _listening(host: str, port: int) -> None:
 
 
 async def supervise(processes: Sequence[Process], *, host: str, port: int, ready: Callable[[], None]) -> None:
-    """Run the processes until SIGINT, SIGTERM or SIGHUP, then end them.
+    """Run the processes until SIGINT, SIGTERM or SIGHUP, or until one does not stay up; then end them.
 
-    Calls `ready` once the port answers. Raises `StartFailed` when one of them does not stay up; the others
-    are ended then.
+    Calls `ready` once the port answers. Raises `StartFailed`.
     """
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()

@@ -1,7 +1,6 @@
-"""Corrections: re-score everything in a new edition, look, publish it at once, and roll back.
+"""Corrections: re-score every active submission in a new edition, compare, publish, roll back.
 
-A correction is a new edition (ground truth × protocol) in which every active submission is evaluated again.
-Publishing it moves one pointer; nothing that was ever published is changed.
+Publishing moves one pointer; nothing that was published is ever changed.
 """
 
 from collections.abc import Sequence
@@ -25,8 +24,6 @@ from leaderboard.queue import lifecycle
 
 @dataclass(frozen=True)
 class RescoringProgress:
-    """How far the re-scoring of an edition is."""
-
     n_total: int
     n_scored: int
     n_rejected: int
@@ -37,17 +34,15 @@ class RescoringProgress:
 
     @property
     def n_done(self) -> int:
-        """How many are decided."""
         return self.n_scored + self.n_rejected + self.n_failed + self.n_cancelled
 
     @property
     def n_waiting(self) -> int:
-        """How many are not."""
         return self.n_total - self.n_done
 
     @property
     def percent(self) -> int:
-        """Of all, rounded down, so that 100 means done."""
+        # Rounded down, so that 100 means done.
         return 100 if self.n_total == 0 else 100 * self.n_done // self.n_total
 
 
@@ -62,10 +57,9 @@ def open_edition(
 ) -> Edition:
     """Open an edition next to the published one and queue every active submission for it.
 
-    The ground truth is read from `path`, or is the imported one of that `digest`, or stays; the protocol
-    stays unless given. Asked again for the same, it goes on with what is there: nothing is queued twice.
-    `actor` None is the command line. Raises `NotMaintainer`, `Refused`, or `evaluator.Rejected` if the file
-    is at fault; nothing changes then.
+    The ground truth is read from `path`, or is the imported one of that `digest`; it and the protocol stay
+    unless given. A second call with the same input queues nothing twice. `actor` None is the command line.
+    Raises `NotMaintainer`, `Refused`, or `evaluator.Rejected`.
     """
     require_maintainer(actor, to="change editions")
     split = Split.objects.select_related("current_edition__ground_truth").filter(name=split_name).first()
@@ -113,7 +107,7 @@ def _imported(split: Split, digest: str | None) -> GroundTruth:
 
 
 def active_submissions(edition: Edition) -> SubmissionQuerySet:
-    """The active submissions of an edition's split, in the order in which they came."""
+    """Return the active submissions of an edition's split, oldest first."""
     rows = Submission.objects.active().filter(split=edition.split_id)
     return rows.select_related("method__team").order_by("submitted_at")
 
@@ -121,7 +115,7 @@ def active_submissions(edition: Edition) -> SubmissionQuerySet:
 def queue_active(edition: Edition) -> int:
     """Queue every active submission that this edition has no evaluation of. Returns their number.
 
-    The caller holds the split's row, so that no new submission slips between.
+    The caller has locked the split's row, so no new submission is missed.
     """
     missing = list(
         active_submissions(edition).exclude(evaluations__edition=edition).values_list("pk", flat=True)
@@ -131,7 +125,7 @@ def queue_active(edition: Edition) -> int:
 
 
 def progress(edition: Edition) -> RescoringProgress:
-    """How far an edition is, with a rate from its first start to now by the database's clock."""
+    """Count the decided evaluations, with a rate since the first start."""
     rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None)
 
     def of(*statuses: Status) -> Count:
@@ -154,13 +148,13 @@ def progress(edition: Edition) -> RescoringProgress:
 
 
 def unfinished(edition: Edition) -> list[Submission]:
-    """Active submissions of the split that this edition has neither scored nor rejected."""
+    """Return active submissions of the split that this edition has neither scored nor rejected."""
     done = Evaluation.objects.filter(edition=edition, status__in=[Status.SCORED, Status.REJECTED])
     return list(active_submissions(edition).exclude(pk__in=done.values("submission")))
 
 
 def newly_rejected(edition: Edition) -> list[Submission]:
-    """Active submissions that the board scores and this edition rejects: publishing it takes them off."""
+    """Return active submissions that the board scores and this edition rejects."""
     here = Evaluation.objects.filter(edition=edition, status=Status.REJECTED)
     board = Evaluation.objects.filter(edition=edition.split.current_edition_id, status=Status.SCORED)
     return list(
@@ -181,9 +175,8 @@ def publish(
 ) -> Publication:
     """Make an edition the board of its split, in one transaction.
 
-    `replaces` is the number of the edition that the maintainer compared with. Submissions that are
-    unfinished, or scored on the board and rejected here, have to be left out knowingly (`leave_out`).
-    Raises `NotMaintainer` or `Refused`.
+    `replaces` is the number of the edition that the maintainer compared with. `leave_out` accepts that
+    unfinished or newly rejected submissions leave the board. Raises `NotMaintainer` or `Refused`.
     """
     require_maintainer(actor, to="change editions")
     reason = _reason(reason)
@@ -209,9 +202,9 @@ def publish(
 def roll_back(
     *, split_name: str, reason: str, now: datetime, actor: User | None, replaces: int | None
 ) -> Publication:
-    """Make the edition that the present one replaced the board again, as it was.
+    """Make the former edition the board again, and queue for it what was submitted since.
 
-    What was submitted since is queued for it. Raises `NotMaintainer` or `Refused`.
+    Raises `NotMaintainer` or `Refused`.
     """
     require_maintainer(actor, to="change editions")
     reason = _reason(reason)
@@ -236,7 +229,7 @@ def roll_back(
 
 
 def predecessor(split: Split) -> Edition | None:
-    """The edition that rolling back returns to: the one that the board replaced when it was published."""
+    """Return the edition that rolling back returns to."""
     latest = split.publications.filter(
         edition=split.current_edition_id, kind=Publication.Kind.PUBLISHED
     ).first()
@@ -246,10 +239,7 @@ def predecessor(split: Split) -> Edition | None:
 
 
 def discard(*, edition: Edition, reason: str, now: datetime, actor: User | None) -> None:
-    """Give up an edition in preparation. Its evaluations stay as they are; what waits is cancelled.
-
-    Raises `NotMaintainer` or `Refused`.
-    """
+    """Give up an edition in preparation, and cancel what waits. Raises `NotMaintainer` or `Refused`."""
     require_maintainer(actor, to="change editions")
     reason = _reason(reason)
     with transaction.atomic():

@@ -16,9 +16,9 @@ _ZONES: Final = "UTC, AoE, a place like Europe/Berlin, or an offset like +01:00"
 
 
 def parse(text: str, *, field: str = "") -> datetime:
-    """The moment that a text like `2027-03-01 23:59 Europe/Berlin` names, in UTC. Raises `Refused`.
+    """Parse a text like `2027-03-01 23:59 Europe/Berlin` into UTC. Raises `Refused`.
 
-    A time without a zone is refused, and so is one that the clocks of the place skip or show twice.
+    A time must have a zone, and must not be one that the zone's clocks skip or show twice.
     """
     text = text.strip()
     match = _FORM.fullmatch(text)
@@ -46,11 +46,7 @@ def parse(text: str, *, field: str = "") -> datetime:
 
 
 def written(moment: datetime | None) -> str:
-    """A moment as `parse` reads it; empty without one.
-
-    >>> written(datetime(2027, 3, 1, 23, 59, tzinfo=UTC)), written(None)
-    ('2027-03-01 23:59 UTC', '')
-    """
+    """Format a moment as `parse` reads it; empty without one."""
     return f"{moment.astimezone(UTC):%Y-%m-%d %H:%M} UTC" if moment else ""
 
 

@@ -1,7 +1,4 @@
-"""Ground truth: imported by a maintainer, and published as an edition of its split.
-
-The database has its digest and counts; the file store has its public manifest; the values are nowhere else.
-"""
+"""Ground truth: imported by a maintainer, and published as an edition of its split."""
 
 import dataclasses
 from collections.abc import Collection, Sequence
@@ -25,11 +22,10 @@ from leaderboard.storage import files, manifests, truth_values
 def import_truth(
     *, split_name: str, path: Path, now: datetime, protocol: str = "tsttc-1", actor: User | None = None
 ) -> Edition:
-    """Validate a split's first ground truth, keep it immutably, and publish edition 1 with it.
+    """Validate a split's first ground truth, keep it, and publish edition 1 with it.
 
-    The same ground truth and protocol again is answered with the edition that has them. Raises
-    `evaluator.Rejected` if the file is at fault, `Refused` if the split is unknown or has an edition with
-    other ground truth (a correction is `rescoring.open_edition`); nothing is changed then.
+    Returns the existing edition for the same ground truth and protocol. Raises `evaluator.Rejected`, or
+    `Refused` if the split is unknown or has other ground truth (a correction is `corrections.open_edition`).
     """
     get_protocol(protocol)
     with transaction.atomic():
@@ -59,8 +55,7 @@ def import_truth(
 def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> GroundTruth:
     """Validate a ground truth and keep it immutably. Returns the existing row for the same file.
 
-    Raises `evaluator.Rejected` if the file is at fault or has no sequence of the published manifest,
-    `Refused` if the split is unknown or the ground truth belongs to another one.
+    Raises `evaluator.Rejected`, or `Refused` if the split is unknown or the ground truth is another split's.
     """
     split = Split.objects.select_related("current_edition__ground_truth").filter(name=split_name).first()
     if split is None:
@@ -109,7 +104,7 @@ def _require_own(split: Split, row: GroundTruth | None) -> None:
 
 
 def _compared(old: GroundTruth | None, truth: evaluator.GroundTruth) -> Comparison | None:
-    """What changed since `old`; None if there is nothing else. Raises `evaluator.Rejected` for no overlap."""
+    """Compare with `old`, if that is another one. Raises `evaluator.Rejected` without a common sequence."""
     if old is None or old.digest == truth.digest:
         return None
     comparison = compare(truth_values.load(old.digest), truth)
@@ -128,7 +123,7 @@ def _keep_comparison(old: GroundTruth, new: GroundTruth, counts: Comparison) -> 
 
 
 def uncompared(*, readable_truths: Collection[str]) -> list[tuple[GroundTruth, GroundTruth]]:
-    """Pairs of the board's ground truth and that of an edition in preparation that are not compared yet.
+    """Return pairs of a board's ground truth and one in preparation that are not compared yet.
 
     They arise when the board changes during the preparation. `readable_truths` has the digests of both.
     """
@@ -151,12 +146,12 @@ def uncompared(*, readable_truths: Collection[str]) -> list[tuple[GroundTruth, G
 
 
 def count_changes(old: GroundTruth, new: GroundTruth) -> None:
-    """Count the differences between two ground truths and keep the counts. Raises as `load` does."""
+    """Count and keep the differences between two ground truths. Raises as `load` does."""
     _keep_comparison(old, new, compare(truth_values.load(old.digest), truth_values.load(new.digest)))
 
 
 def units_of(row: GroundTruth) -> Units:
-    """What a new edition takes as independent. Raises `OSError` if the store lacks the manifest."""
+    """Read the unit of inference of a new edition. Raises `OSError` without the manifest."""
     return manifests.load(row.manifest_digest).units
 
 
@@ -168,7 +163,7 @@ def new_edition(
     now: datetime,
     actor: User | None,
 ) -> Edition:
-    """The next edition of a split whose row the caller has locked, with decimals and unit of this moment."""
+    """Create the next edition of a split whose row the caller has locked."""
     units = units_of(row)
     last = split.editions.aggregate(last=Max("number"))["last"] or 0
     edition = Edition.objects.create(

@@ -1,4 +1,4 @@
-"""The history of editions: when each was published, what replaced it, how a correction changed an entry."""
+"""The history of editions: when each was published and replaced, and how a correction changed an entry."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -21,8 +21,6 @@ from leaderboard.models import (
 
 @dataclass(frozen=True)
 class EditionRecord:
-    """An edition that was published, and what became of it."""
-
     edition: Edition
     followed: Edition | None  # the board that it first replaced
     change: "TruthChange | None"  # of the ground truth since then; None where the two were never compared
@@ -31,7 +29,6 @@ class EditionRecord:
 
     @property
     def is_board(self) -> bool:
-        """Whether it is the board now."""
         return self.replaced_by is None
 
 
@@ -47,7 +44,7 @@ class TruthChange:
 
 @dataclass(frozen=True)
 class Rescored:
-    """What the last change of the board did to one submission: its evaluation before and after."""
+    """The evaluations of a submission before and after the last change of the board."""
 
     publication: Publication
     old: Evaluation | None
@@ -55,26 +52,26 @@ class Rescored:
 
 
 def changelog(split: Split) -> QuerySet[Publication]:
-    """Every change of a split's board, the newest first."""
+    """Return every change of a split's board, newest first."""
     rows = split.publications.select_related("edition__ground_truth", "replaced__ground_truth")
     return rows.order_by("-at", "-pk")
 
 
 def latest_change(split: Split) -> Publication | None:
-    """How the present board became the board; None if it replaced none."""
+    """Return the change that made the present board; None for the first board."""
     latest = changelog(split).first()
     return latest if latest and latest.replaced_id else None
 
 
 def latest_changes(n: int) -> list[Publication]:
-    """The last changes of all boards that are not switched off, the newest first."""
+    """Return the last changes of all boards that are not switched off, newest first."""
     rows = Publication.objects.filter(split__in=Split.objects.shown())
     rows = rows.select_related("split", "edition__ground_truth", "replaced__ground_truth")
     return list(rows.order_by("-at", "-pk")[:n])
 
 
 def history(split: Split, publications: Iterable[Publication]) -> tuple[EditionRecord, ...]:
-    """Every edition that was ever published, the newest first; `publications` are the split's changelog."""
+    """Return every published edition, newest first; `publications` are the split's changelog."""
     published = split.editions.exclude(published_at=None).select_related("ground_truth")
     # All at once, since each edition that followed another asks for one.
     rows = TruthComparison.objects.filter(new__split=split.truth_split_id).order_by("pk")
@@ -88,7 +85,7 @@ def record_of(
     publications: Iterable[Publication] | None = None,
     compared: Sequence[TruthComparison] | None = None,
 ) -> EditionRecord:
-    """What became of one published edition; with the changelog and the comparisons where they are at hand."""
+    """Return the record of a published edition; reads what is not given."""
     log = changelog(edition.split) if publications is None else publications
     own = tuple(each for each in log if each.edition_id == edition.pk)
     replaced_by = next((each for each in log if each.replaced_id == edition.pk), None)
@@ -106,10 +103,9 @@ def record_of(
 def change_of_truth(
     before: GroundTruth, after: GroundTruth, compared: Sequence[TruthComparison] | None = None
 ) -> TruthChange | None:
-    """What differs between two ground truths; None if these two were never compared.
+    """Return the differences of two ground truths; None if they were never compared.
 
-    They are counted by the command that reads one of them in, against the board's of that moment, or else by
-    a worker. `compared` are the comparisons to look among, where they are at hand.
+    `compared` are comparisons that were read already.
     """
     if before.pk == after.pk:
         return TruthChange(0, 0, 0, 0)
@@ -126,7 +122,7 @@ def change_of_truth(
 
 
 def rescored(submission: Submission) -> Rescored | None:
-    """What the last change of the board did to an active submission; None if it came after that."""
+    """Return what the last change of the board did to an active submission; None for a later submission."""
     publication = latest_change(submission.split)
     if publication is None or publication.at <= submission.submitted_at or submission.withdrawn_at:
         return None
@@ -146,7 +142,7 @@ def rescored(submission: Submission) -> Rescored | None:
 
 
 def maintainer_overview(split: Split) -> dict[str, Any]:
-    """The editions of a split as maintainers see them, and system errors."""
+    """Return the editions of a split for maintainers, and system errors."""
     rows = list(split.editions.select_related("ground_truth", "split").order_by("-number"))
     published = next((e for e in rows if e.pk == split.current_edition_id), None)
     failed = Evaluation.objects.filter(status=Status.SYSTEM_ERROR, submission__withdrawn_at=None)
@@ -165,7 +161,7 @@ def maintainer_overview(split: Split) -> dict[str, Any]:
 
 
 def manifest_digest(*, split: Split, number: str) -> str | None:
-    """The manifest of the board, or of the edition of a number that is or was it; None for no such one."""
+    """Return the digest of the manifest of the board, or of a published edition's number."""
     if not number:
         return split.current_edition.ground_truth.manifest_digest if split.current_edition else None
     if not (number.isascii() and number.isdigit() and len(number) < 7):

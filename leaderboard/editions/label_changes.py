@@ -1,7 +1,4 @@
-"""What a correction of labels would change, before anything is kept: recording by recording.
-
-For maintainers where the ground truth is: differences of hidden values are as private as the values.
-"""
+"""Changes of labels, recording by recording, before a correction is kept; as private as the values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,7 +21,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class LabelChanges:
-    """What a file would change of a board, and the recordings with any change, the greatest first."""
+    """The differences between a file and a board, and the recordings with any, greatest first."""
 
     edition: Edition
     counts: Comparison
@@ -32,10 +29,9 @@ class LabelChanges:
 
 
 def look(*, split_name: str, path: Path) -> LabelChanges:
-    """Compare a ground truth with that of the board. Nothing is kept or queued.
+    """Compare a ground truth with that of the board; keep nothing.
 
-    Raises `evaluator.Rejected` if the file is at fault, `Refused` if the split has no board, `OSError` if
-    the board's values are not here.
+    Raises `evaluator.Rejected`, `Refused` if the split has no board, `OSError` if its values are not here.
     """
     split = Split.objects.select_related("current_edition__ground_truth").filter(name=split_name).first()
     if split is None or split.current_edition is None:
@@ -48,7 +44,7 @@ def look(*, split_name: str, path: Path) -> LabelChanges:
 
 
 def _by_recording(old: evaluator.GroundTruth, new: evaluator.GroundTruth) -> list[dict[str, Any]]:
-    """A row for each recording with any change; times are in seconds, to the microsecond."""
+    """Make a row for each recording with any change; times in seconds."""
     rows = rows_in(old.manifest, new.manifest)
     is_common = rows >= 0
     # Sequences that the new one has are named by it, the others by the old one.

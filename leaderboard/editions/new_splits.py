@@ -30,11 +30,11 @@ def add_split(
     actor: User | None,
     is_simulated: bool = False,
 ) -> Split:
-    """Make a split; its place is behind all others where the policy says 0.
+    """Make a split, at the end of the list if the policy says 0.
 
-    Without `same_truth_as`, `is_hidden` says whether its ground truth is hidden, and an import brings that.
-    With it, the split shares the ground truth of that one, and its first edition is published at once.
-    `actor` None is the command line. Raises `NotMaintainer` and `Refused`.
+    `same_truth_as` names a split whose ground truth it shares; its first edition is published at once.
+    Otherwise `is_hidden` says whether the ground truth to be imported is hidden. `actor` None is the command
+    line. Raises `NotMaintainer` and `Refused`.
     """
     require_maintainer(actor, to="add splits")
     if not _NAME.fullmatch(name) or name in _RESERVED:
@@ -89,7 +89,6 @@ def add_split(
 
 
 def _sharing(name: str) -> Split:
-    """The split whose ground truth is to be shared, locked until the transaction ends."""
     split = Split.objects.select_for_update(no_key=True).filter(pk=name).first()
     if split is None or split.current_edition_id is None or split.same_truth_as_id is not None:
         able = Split.objects.filter(same_truth_as=None).exclude(current_edition=None)

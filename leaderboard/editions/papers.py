@@ -1,8 +1,4 @@
-"""Documents of quoted rows: the numbers that a paper prints, read with the place of everything that is wrong.
-
-`docs/maintainers.md` describes the form. The document in `leaderboard/editions/published/` has its numbers
-in the tables of `evaluator.papers`, which the boards share with the page of the paper.
-"""
+"""Documents of published results (`docs/maintainers.md`), read with the place of every fault."""
 
 import json
 import math
@@ -28,7 +24,7 @@ _is_web_address = URLValidator(schemes=["http", "https"])
 
 
 class BadDocument(Refused):
-    """Everything that is wrong with a document, each sentence behind its place."""
+    """All faults of a document, each sentence after its place."""
 
     def __init__(self, problems: list[str]) -> None:
         left_out = len(problems) - MAX_PROBLEMS
@@ -38,7 +34,7 @@ class BadDocument(Refused):
 
 
 def parse(data: bytes) -> dict[str, Any]:
-    """The document in these bytes of JSON. Raises `BadDocument`."""
+    """Parse a document of JSON. Raises `BadDocument`."""
     if len(data) > MAX_BYTES:
         raise BadDocument([f"The file has {len(data):,} bytes; expected at most {MAX_BYTES:,}."])
     try:
@@ -58,7 +54,7 @@ def parse(data: bytes) -> dict[str, Any]:
 
 
 def rows_of(document: Mapping[str, Any], *, splits: Collection[str], now: datetime) -> list[dict[str, Any]]:
-    """The rows of a document as columns of `PublishedResult`. Raises `BadDocument` for all that is wrong."""
+    """Convert a document into columns of `PublishedResult`. Raises `BadDocument`."""
     problems = list(_problems(document, splits, latest_year=now.year + 1))
     if problems:
         raise BadDocument(problems)
@@ -221,11 +217,6 @@ def _kind_at(holder: Mapping[str, Any], name: str) -> str:
 
 
 def _kind(value: object) -> str:
-    """A value in a few words.
-
-    >>> _kind([]), _kind("x" * 99)[:10], _kind(None), _kind(-1)
-    ('a list', "'xxxxxxxxx", 'null', '-1')
-    """
     if isinstance(value, dict | list):
         return "an object" if isinstance(value, dict) else "a list"
     return "null" if value is None else repr(value)[:60]

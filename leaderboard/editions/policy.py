@@ -21,7 +21,7 @@ POSITION_FAULT: Final = f"The position is %(show_value)s; expected a whole numbe
 
 @dataclass(frozen=True, kw_only=True)
 class Policy:
-    """All that can be changed about a split, under the names of its columns."""
+    """The columns of a split that maintainers can change."""
 
     title: str
     description: str = ""
@@ -55,16 +55,11 @@ FIRST_POLICY: Final = Policy(title="", listing=Listing.OFF, **HIDDEN_QUOTA)
 
 
 def policy_of(split: Split) -> Policy:
-    """The policy that a split has."""
     return Policy(**{name: getattr(split, name) for name in NAMES})
 
 
 def change(*, split_name: str, policy: Policy, actor: User | None) -> Split:
-    """Give a split another policy, from now on. `actor` None is the command line.
-
-    Raises `NotMaintainer`, and `Refused` for an unknown split and for what makes no sense; nothing is changed
-    then.
-    """
+    """Change a split's policy. `actor` None is the command line. Raises `NotMaintainer` and `Refused`."""
     require_maintainer(actor, to="change splits")
     with transaction.atomic():
         split = Split.objects.select_for_update(no_key=True).filter(pk=split_name).first()
@@ -93,8 +88,7 @@ def change(*, split_name: str, policy: Policy, actor: User | None) -> Split:
 def announce(*, text: str, ends_at: datetime | None, now: datetime, actor: User | None) -> None:
     """Show one line on all pages about splits until it ends; without a text, none.
 
-    The lines of single splits stay beside it. Raises `NotMaintainer`, and `Refused` for a text without an end
-    and for an end that is over.
+    Raises `NotMaintainer`, and `Refused` without an end in the future.
     """
     require_maintainer(actor, to="announce something")
     text = " ".join(clean_text("announcement", text, limit=300, required=False).split())
@@ -128,7 +122,7 @@ def announce(*, text: str, ends_at: datetime | None, now: datetime, actor: User 
 
 
 def checked(split: Split, policy: Policy) -> Split:
-    """The split with this policy, which is not written yet. Raises `Refused` at the first field at fault."""
+    """Return the unsaved split with this policy. Raises `Refused` at the first field at fault."""
     values = asdict(policy) | {
         "title": clean_text("title", policy.title, limit=80),
         "description": clean_text("description", policy.description, limit=MAX_DESCRIPTION, required=False),
@@ -153,7 +147,7 @@ def checked(split: Split, policy: Policy) -> Split:
 
 
 def require_listable(split: Split) -> None:
-    """Raise `Refused` where a split would appear on pages before it has ground truth."""
+    """Raise `Refused` where a split would be listed before it has ground truth."""
     if split.listing != Listing.OFF and not split.has_ground_truth:
         raise Refused(
             "bad-value",

@@ -1,4 +1,4 @@
-"""What an edition in preparation would change, before anything is public."""
+"""What an edition in preparation would change, before it is published."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -18,9 +18,9 @@ ABSENT = "ABSENT"  # not evaluated in that edition
 
 @dataclass(frozen=True)
 class Change:
-    """One active submission in the published edition and in the one in preparation.
+    """An active submission in the published edition and in the one in preparation.
 
-    Ranks are those of the boards, and given for the submission that represents its method there.
+    It has a rank where it represents its method.
     """
 
     submission_id: UUID
@@ -39,26 +39,26 @@ class Change:
 
     @property
     def delta(self) -> dict[str, float | None]:
-        """New minus old published values; None where either is missing."""
+        """Return new minus old scores; None where either is missing."""
         names = dict.fromkeys([*self.old, *self.new])
         return {name: _difference(self.old.get(name), self.new.get(name)) for name in names}
 
     @property
     def rank_change(self) -> int:
-        """How many places the rank moves; entries that leave or join the board come first of all."""
+        """Return the change of rank; entries that leave or join the board sort first."""
         if self.old_rank is None or self.new_rank is None:
             return 0 if self.old_rank == self.new_rank else 10**6
         return abs(self.new_rank - self.old_rank)
 
     @property
     def is_changed(self) -> bool:
-        """Whether anything that people see changes."""
+        """Tell whether anything public changes."""
         return (self.old_status, self.old, self.old_rank) != (self.new_status, self.new, self.new_rank)
 
 
 @dataclass(frozen=True)
 class Preview:
-    """Everything that publishing would change. `replaces` is the number of the published edition."""
+    """All changes that publishing would make."""
 
     edition: Edition
     published: Edition
@@ -68,18 +68,15 @@ class Preview:
 
     @property
     def replaces(self) -> int:
-        """The edition that this was compared with; publishing asks for it again."""
         return self.published.number
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the scores of either edition."""
         rules = (self.published.rules, self.edition.rules)
         return tuple(dict.fromkeys(name for each in rules for name in each.score_names))
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Of the flat rows, in their order."""
         return (
             *("submission", "method", "team", "old_status", "new_status", "old_rank", "new_rank"),
             *(f"{side}_{name}" for side in ("old", "new", "delta") for name in self.names),
@@ -88,7 +85,7 @@ class Preview:
 
     @property
     def entries(self) -> tuple[Change, ...]:
-        """Submissions that either edition may show: those that were rejected and stay so are none."""
+        """Return submissions that either edition shows."""
         return tuple(
             change
             for change in self.changes
@@ -97,17 +94,14 @@ class Preview:
 
     @property
     def n_changed(self) -> int:
-        """Entries that change in any way."""
         return sum(change.is_changed for change in self.changes)
 
     @property
     def n_moved(self) -> int:
-        """Entries whose rank changes."""
         return sum(change.rank_change > 0 for change in self.changes)
 
     @property
     def n_newly_rejected(self) -> int:
-        """Entries that were scored and that the new ground truth or protocol cannot score."""
         return sum(
             change.old_status == Status.SCORED and change.new_status == Status.REJECTED
             for change in self.changes
@@ -115,10 +109,7 @@ class Preview:
 
 
 def preview(edition: Edition) -> Preview:
-    """Compare an edition with the published one of its split, the greatest change of rank first.
-
-    Raises `Refused` if the split has no published edition.
-    """
+    """Compare an edition with the published one, by change of rank. Raises `Refused` without one."""
     published = edition.split.current_edition
     if published is None:
         raise Refused(
@@ -139,9 +130,9 @@ def preview(edition: Edition) -> Preview:
 
 
 def rows(edition_preview: Preview) -> list[dict[str, Any]]:
-    """The preview as flat rows for CSV and JSON: one for each submission, with its `columns`.
+    """Return flat rows for CSV and JSON, one for each submission.
 
-    `n_renumbered` is of the edition and the same in all rows: sequences with another anno_id than before.
+    `n_renumbered` counts sequences with another anno_id than before, the same in all rows.
     """
     return [
         {
@@ -163,7 +154,7 @@ def rows(edition_preview: Preview) -> list[dict[str, Any]]:
 
 
 def document(edition_preview: Preview) -> dict[str, Any]:
-    """The preview as one document for programs: totals, progress, and the flat rows."""
+    """Return totals, progress and the flat rows as one JSON document."""
     truth, progress = edition_preview.truth, edition_preview.progress
     return {
         "edition": edition_preview.edition.number,
@@ -187,21 +178,17 @@ def document(edition_preview: Preview) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Side:
-    """One edition of a comparison: evaluations and ranks by submission, values by evaluation."""
-
     edition: Edition
     evaluations: Mapping[UUID, Evaluation]
     scores: Mapping[UUID, Mapping[str, float | None]]
     ranks: Mapping[UUID, int | None]
 
     def values(self, submission: Submission) -> Mapping[str, float | None]:
-        """The values of a submission, None where it has none."""
         evaluation = self.evaluations.get(submission.pk)
         scores = self.scores.get(evaluation.pk) if evaluation else None
         return scores or dict.fromkeys(self.edition.rules.score_names)
 
     def status(self, submission: Submission) -> str:
-        """The state of a submission's evaluation."""
         evaluation = self.evaluations.get(submission.pk)
         return evaluation.status if evaluation else ABSENT
 

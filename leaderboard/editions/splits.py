@@ -1,4 +1,4 @@
-"""The splits that the benchmark has from the start, and the rows quoted from papers."""
+"""The splits and the published results that the benchmark has from the start."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -54,10 +54,9 @@ SPLITS: tuple[dict[str, Any], ...] = (
 
 
 def ensure_splits(*, split_model: Any = Split, result_model: Any = PublishedResult) -> None:
-    """Make the three splits and the published rows where they are missing; change nothing that is there.
+    """Make the three splits and the published rows where they are missing.
 
-    Rows that come with their split stand there since ever; those that come later, since now. A migration
-    passes the models as they were in its time.
+    Rows of a new split are there since ever, later ones since now. A migration passes its own models.
     """
     now = timezone.now()
     made = set()
@@ -75,7 +74,7 @@ def ensure_splits(*, split_model: Any = Split, result_model: Any = PublishedResu
 
 
 def _with_results(document: Mapping[str, Any]) -> dict[str, Any]:
-    """A document of ours with its numbers: `results_of` names the paper's table that has them."""
+    # `results_of` names the table of the paper that has the numbers.
     table = published_tables().table(document["results_of"])
     results: dict[str, dict[str, list[Any]]] = {}
     for row in table.rows:
@@ -95,11 +94,10 @@ class Imported:
 def import_published(
     *, document: Mapping[str, Any], now: datetime, is_replacing: bool = False, actor: User | None = None
 ) -> Imported:
-    """Put the rows of one paper on the boards from now on, all or none of them.
+    """Put all rows of a paper on the boards from now on, or none.
 
-    A row that is there with the same content stays. One with other content is replaced, which boards of the
-    past do not notice. Raises `Refused` for that unless `is_replacing`, `papers.BadDocument` for what is no
-    such document, and `NotMaintainer`; `actor` None is the command line.
+    A row with other content is replaced with `is_replacing`; boards of the past keep the former one.
+    `actor` None is the command line. Raises `Refused`, `papers.BadDocument` and `NotMaintainer`.
     """
     require_maintainer(actor, to="add rows of papers")
     rows = papers.rows_of(document, splits=Split.objects.values_list("name", flat=True), now=now)
@@ -125,7 +123,7 @@ def import_published(
 def remove_published(
     *, split_name: str, slug: str, reason: str, now: datetime, actor: User | None = None
 ) -> PublishedResult:
-    """Take a quoted row off the board from now on; boards of the past keep it.
+    """Take a published result off the board from now on; boards of the past keep it.
 
     `actor` None is the command line. Raises `NotMaintainer`, and `Refused` without a reason or such a row.
     """
@@ -155,13 +153,12 @@ def remove_published(
 
 
 def quoted() -> QuerySet[PublishedResult]:
-    """The quoted rows that the boards show now, split by split, the newest first."""
+    """Return the published results on the boards now, by split, newest first."""
     rows = PublishedResult.objects.filter(replaced_at=None).select_related("split")
     return rows.order_by("split__position", "split", "-added_at", "pk")
 
 
 def _import_row(row: Mapping[str, Any], *, now: datetime, is_replacing: bool) -> str:
-    """Add or replace one row. Returns which of the two was done, or that it is unchanged."""
     current = PublishedResult.objects.select_for_update(no_key=True).filter(replaced_at=None)
     there = current.filter(split=row["split_id"], slug=row["slug"]).first()
     if there is not None:

@@ -1,4 +1,1 @@
-"""Errors: one refusal for everything that people may do wrong, problem codes, outages.
-
-Every room may import this one.
-"""
+"""Errors: one refusal for everything that people may do wrong, problem codes, outages."""

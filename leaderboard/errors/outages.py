@@ -16,7 +16,7 @@ POSTGRESQL_DISK_FULL = "53100"
 
 @dataclass(frozen=True)
 class Outage:
-    """An answer. `status` is HTTP's, `code` is stable, `retry_after_s` is a guess."""
+    """An HTTP answer; `code` is stable, `retry_after_s` is a guess."""
 
     status: int
     code: str
@@ -26,7 +26,6 @@ class Outage:
 
     @property
     def headers(self) -> dict[str, str]:
-        """The headers of the answer."""
         return {"Retry-After": str(self.retry_after_s)}
 
 
@@ -57,7 +56,7 @@ STORAGE_FULL = Outage(
 
 
 def outage_of(fault: BaseException | None) -> Outage | None:
-    """The outage that this fault is a sign of; None if it is something else."""
+    """Return the outage that a fault is a sign of, if any."""
     outage = None
     if isinstance(fault, OperationalError | InterfaceError):
         # The driver's own exception, which knows PostgreSQL's code.

@@ -1,8 +1,4 @@
-"""Problem documents (RFC 9457) and every problem code of the API.
-
-A code is stable: programs may rely on it. Those of prediction files are `evaluator.problems.PROBLEM_CODES`.
-A test checks that every code in the source stands here and in docs/api.md.
-"""
+"""Problem documents (RFC 9457) and every stable problem code of the API, but those of prediction files."""
 
 from collections.abc import Mapping
 from http import HTTPStatus
@@ -96,7 +92,7 @@ API_CODES: Final[dict[str, str]] = {
 
 
 def document(*, status: int, code: str, detail: str, where: str = "") -> dict[str, Any]:
-    """The problem document of one problem. `type` is the URL of its code in the API reference."""
+    """Make the problem document of one problem; `type` is the URL of its code in the API reference."""
     return {
         "type": f"{settings.SITE_URL}/docs/api/#problem-{code}",
         "title": HTTPStatus(status).phrase,
@@ -110,7 +106,7 @@ def document(*, status: int, code: str, detail: str, where: str = "") -> dict[st
 def response(
     *, status: int, code: str, detail: str, where: str = "", headers: Mapping[str, str] | None = None
 ) -> JsonResponse:
-    """The same as an answer, where no view of the API makes it."""
+    """Make the same as an answer, for code outside the API's views."""
     return JsonResponse(
         document(status=status, code=code, detail=detail, where=where),
         status=status,

@@ -1,4 +1,4 @@
-"""The refusal of a request, and texts that people write, cleaned or refused."""
+"""The refusal of a request; texts of people, cleaned or refused."""
 
 import unicodedata
 
@@ -15,10 +15,7 @@ _MOST_COMPOSED = 4
 
 
 class Refused(Exception):
-    """What was asked for cannot be done. `field` names the input at fault, `code` is stable.
-
-    `advice` says at the field of a form what to enter; without it the message stands there.
-    """
+    """A request is refused. `field` is the input at fault, `code` is stable, `advice` is shown in forms."""
 
     def __init__(self, code: str, message: str, *, field: str = "", advice: str = "") -> None:
         super().__init__(message)
@@ -28,17 +25,17 @@ class Refused(Exception):
 
 
 class NotMaintainer(Exception):
-    """Only maintainers may do what was asked for."""
+    """The actor is no maintainer."""
 
 
 def require_maintainer(actor: User | None, *, to: str) -> None:
-    """Raise `NotMaintainer` for anybody else; None is the command line. `to` ends "Only maintainers may"."""
+    """Raise `NotMaintainer` for other actors; None is the command line. `to` ends "Only maintainers may"."""
     if actor is not None and not actor.acts_as_maintainer:
         raise NotMaintainer(f"Only maintainers may {to}.")
 
 
 def shown_split(name: str) -> Split:
-    """The split of that name, with its published edition and ground truth. Raises `Refused`."""
+    """Return the split of that name, with its published edition and ground truth. Raises `Refused`."""
     # Looked up here and not there: not every text is one that a database can be asked for.
     rows = Split.objects.shown().select_related("current_edition__ground_truth")
     splits = {split.name: split for split in rows}
@@ -49,7 +46,7 @@ def shown_split(name: str) -> Split:
 
 
 def clean_text(name: str, text: str, *, limit: int, required: bool = True) -> str:
-    """The text without surrounding space. Raises `Refused` for control characters, excess or absence."""
+    """Strip a text. Raises `Refused` for control characters, excess or absence."""
     text = text.strip()
     if len(text) <= _MOST_COMPOSED * limit:
         text = unicodedata.normalize("NFC", text).strip()
@@ -72,7 +69,7 @@ def clean_text(name: str, text: str, *, limit: int, required: bool = True) -> st
 
 
 def clean_url(name: str, text: str) -> str:
-    """An address of the web, or nothing. Raises `Refused`."""
+    """Check an address of the web; it may be empty. Raises `Refused`."""
     text = clean_text(name, text, limit=MAX_URL, required=False)
     if text:
         try:

@@ -1,4 +1,1 @@
-"""Exports: a board in other formats: CSV, JSON, LaTeX, Markdown, BibTeX, badge and feed.
-
-Pages, API and commands import this room; it reads boards.
-"""
+"""Exports: a board in other formats: CSV, JSON, LaTeX, Markdown, BibTeX, badge and feed."""

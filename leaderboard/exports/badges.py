@@ -1,4 +1,4 @@
-"""A badge for a README: a method's rank and MiD as a small drawing."""
+"""A badge for a README with a method's rank and MiD."""
 
 from typing import Final
 from xml.sax.saxutils import escape, quoteattr
@@ -18,7 +18,6 @@ _FONT: Final = "Verdana,DejaVu Sans,Geneva,sans-serif"
 
 
 def words(entry: Entry | None) -> str:
-    """What a badge says of a method's row: its rank and MiD, or why there are none."""
     if entry is None:
         return "no entry"
     if entry.withdrawn_at is not None:

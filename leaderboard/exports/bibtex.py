@@ -1,4 +1,4 @@
-"""BibTeX: of the benchmark's paper, of the papers that published rows are quoted from, and of methods."""
+"""BibTeX of the benchmark, of papers with published results, and of methods."""
 
 import json
 import re
@@ -23,9 +23,9 @@ _IN_ADDRESSES: Final = {character: f"%{ord(character):02X}" for character in '{}
 
 
 def references(entries: Iterable[Entry], *, of_board: str = "") -> Iterator[str]:
-    """The benchmark's paper, the board itself, then one entry for each further paper that a row names.
+    """Yield the benchmark's paper, the board itself, then one entry for each further paper of a row.
 
-    That of a row of one's own that others do not see as it is says so in its note, which styles print.
+    The note of a row marks one that others see differently.
     """
     yield of_benchmark()
     if of_board:
@@ -39,26 +39,24 @@ def references(entries: Iterable[Entry], *, of_board: str = "") -> Iterator[str]
 
 @lru_cache(maxsize=1)
 def benchmark_source() -> dict[str, str]:
-    """The benchmark's paper as its published results name it: title, authors, year, url."""
+    """Return title, authors, year and url of the benchmark's paper."""
     path = _QUOTED_ROWS / "tsttc-2023.json"
     source: dict[str, str] = json.loads(path.read_text(encoding="utf-8"))["source"]
     return source
 
 
 def benchmark_key() -> str:
-    """How the benchmark's paper is cited."""
     source = benchmark_source()
     return _paper_key(source["authors"], source["year"], source["title"])
 
 
 def of_benchmark() -> str:
-    """The benchmark's paper."""
     source = benchmark_source()
     return _paper(benchmark_key(), source["title"], source["authors"], str(source["year"]), source["url"])
 
 
 def of_edition(edition: Edition, *, address: str, at: datetime | None) -> str:
-    """The board of an edition as of a time, at an address where it stays."""
+    """Cite the board of an edition as of a time, at a permanent address."""
     facts = [f"Protocol {edition.protocol}", f"ground truth {edition.ground_truth_id}"]
     facts += [f"as of {at.astimezone(UTC):%Y-%m-%d}"] if at else []
     return _entry(
@@ -74,7 +72,7 @@ def of_edition(edition: Edition, *, address: str, at: datetime | None) -> str:
 
 
 def key_of(entry: Entry) -> str:
-    """How a row is cited: a published one by its paper, a method by its name and the start of its id."""
+    """Return the key: a published result's paper, or a method's name and the start of its id."""
     if entry.kind == "published":
         return _paper_key(entry.team, entry.year or "", entry.source_title)
     name = _plain(entry.method)[:40].strip("-") or "method"
@@ -82,10 +80,7 @@ def key_of(entry: Entry) -> str:
 
 
 def of_entry(entry: Entry, *, page: str = "") -> str:
-    """A row's own entry. Of a method it names the team and the paper's address, which is all that is known.
-
-    A method without a paper is cited by its `page`.
-    """
+    """Cite a row: its team and paper; a method without a paper by its `page`."""
     if entry.kind == "published":
         year = str(entry.year or "")
         return _paper(key_of(entry), entry.source_title, entry.team, year, entry.paper_url)
@@ -135,6 +130,6 @@ def _paper_key(authors: str, year: object, title: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """Letters and digits of ASCII, with hyphens between: what every BibTeX takes in a key."""
+    # Letters, digits and hyphens of ASCII: every BibTeX takes these in a key.
     ascii_text = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
     return re.sub(r"[^a-z0-9]+", "-", ascii_text).strip("-")

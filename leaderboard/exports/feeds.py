@@ -1,7 +1,4 @@
-"""What others fetch now and then: new entries as an Atom feed (RFC 4287), and the sitemap (sitemaps.org).
-
-The feed says what everybody sees, under the names that everybody sees.
-"""
+"""New entries as an Atom feed (RFC 4287), and the sitemap (sitemaps.org)."""
 
 from collections.abc import Iterable
 from datetime import UTC, datetime
@@ -26,19 +23,19 @@ _BEGINNING: Final = datetime(2023, 9, 4, tzinfo=UTC)
 
 
 def is_news(entry: Entry) -> bool:
-    """Whether a row is in the feed: it was submitted and is not withdrawn."""
+    """Tell whether a row is in the feed: it was submitted and is not withdrawn."""
     return entry.kind == "submission" and entry.withdrawn_at is None
 
 
 class _Feed(Atom1Feed):
-    """A feed that says the same for as long as nothing happens."""
+    """An Atom feed with the same bytes for as long as its rows are the same."""
 
     def latest_post_date(self) -> datetime:
         return super().latest_post_date() if self.items else _BEGINNING
 
 
 def atom(rows: Iterable[tuple[Split, Entry]], *, title: str, address: str, page: str) -> str:
-    """The newest of these rows of boards as a feed at `address`, which tells of what `page` shows."""
+    """Make a feed at `address` of the newest rows; `page` shows the same."""
     feed = _Feed(
         title=one_line(title),
         link=page,
@@ -67,18 +64,18 @@ def atom(rows: Iterable[tuple[Split, Entry]], *, title: str, address: str, page:
 
 
 def _came_at(entry: Entry) -> datetime:
-    """When it was first shown: a method that was private has been tried long before anybody could see it."""
+    """Return when the row was first shown, which may be long after it was submitted."""
     return entry.listed_at or _BEGINNING
 
 
 def _id(split: Split, entry: Entry) -> UUID:
-    """The same as long as the method is on the board, whatever it is called and has scored."""
+    """Make an id that survives renaming and another score."""
     assert entry.method_id is not None  # noqa: S101 - for the type checker: rows of submissions have one
     return uuid5(entry.method_id, split.pk)
 
 
 def sitemap(pages: Iterable[tuple[str, datetime | None]]) -> bytes:
-    """Public pages: the absolute address of each, and when it last changed where that is known."""
+    """Make the sitemap of public pages: absolute address and, if known, last change."""
     root = ET.Element("urlset", xmlns=_SITEMAP)
     for address, changed_at in pages:
         element = ET.SubElement(root, "url")

@@ -1,8 +1,4 @@
-"""All submissions with all their numbers, for maintainers: a row for each evaluation.
-
-The numbers are those that are published, with the decimals of their edition. Files and hidden values are not
-among them. Addresses are there only if asked for.
-"""
+"""All submissions with all their published numbers, for maintainers: a row for each evaluation."""
 
 from collections.abc import Callable, Iterator, Mapping
 from datetime import datetime
@@ -40,12 +36,11 @@ _FACTS: Final[Mapping[str, _Fact]] = {
 
 
 def columns() -> tuple[str, ...]:
-    """The names of the columns, the scores of all protocols among them."""
     return (*_FACTS, *known_names())
 
 
 def rows(*, split: str = "", has_addresses: bool = False) -> Iterator[dict[str, object]]:
-    """A row for each evaluation, in the order in which submissions came; None where there is no value.
+    """Yield a row for each evaluation, oldest submission first; None where there is no value.
 
     `submitted_by` is the number of the account, or its address with `has_addresses`.
     """

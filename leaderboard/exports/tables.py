@@ -1,10 +1,7 @@
 """A board of the site as an export.
 
-Every number is the text that the page shows. The texts of strangers are shown as they are and have no power
-over what is around them, in a spreadsheet, a paper or a note.
-
-What a board holds is for whoever draws it to decide. A row of one's own that others do not see as it is says
-so in every form: in a paper it would tell them.
+Every number is the text that the page shows; texts of teams have no power in a spreadsheet or a paper.
+A row that others see differently says so in every format.
 """
 
 from collections.abc import Sequence
@@ -26,19 +23,19 @@ WITH_INTERVALS: Final = {"1": True, "yes": True, "0": False, "no": False}
 
 
 def is_asked_for(name: str, text: str) -> bool:
-    """Whether an address asks for more than usual; without a word it does not. Raises `filters.BadFilter`."""
+    """Tell whether a query sets this switch. Raises `filters.BadFilter`."""
     if text and text not in WITH_INTERVALS:
         raise BadFilter(name, text, f"one of {', '.join(WITH_INTERVALS)}")
     return WITH_INTERVALS.get(text, False)
 
 
 def team_of(entry: Entry) -> str:
-    """The team of an entry, or the short form of a paper's authors."""
+    """Return the team, or the short form of a paper's authors."""
     return layouts.short_authors(entry.team) if entry.kind == "published" else entry.team
 
 
 def mark_of(entry: Entry) -> str:
-    """The note on a row of one's own that others see differently; empty for any other row."""
+    """Return the note on a row that others see differently; else empty."""
     return layouts.mark_of(visibility=entry.visibility, pseudonym=entry.pseudonym)
 
 
@@ -46,7 +43,7 @@ def mark_of(entry: Entry) -> str:
 
 
 def export(board: Board, *, address: str, metric: str = "", has_intervals: bool = False) -> Export:
-    """A board as it is shown: all scores, or those of one metric. `address` is one at which it stays."""
+    """Export all scores of a board, or those of one metric. `address` is permanent."""
     scores, names = board.rules.names_of(metric), board.rules.score_names
     return Export(
         origin=_origin(board, address=address),
@@ -122,7 +119,7 @@ def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
 
 
 def latex_row(entry: Entry) -> str:
-    """One row of the LaTeX table of its board: all scores, without intervals."""
+    """Make one row of the LaTeX table: all scores, without intervals."""
     return layouts.latex_row(_layout_row(entry, columns=tuple(entry.scores), has_intervals=False))
 
 

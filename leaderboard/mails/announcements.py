@@ -1,4 +1,4 @@
-"""Announcements: a text of the maintainers by mail to the people whose teams sent a file to a split."""
+"""Announcements: mails of maintainers to the people whose teams sent a file to a split."""
 
 import hashlib
 from dataclasses import dataclass
@@ -18,32 +18,30 @@ MAX_TEXT: Final = 5000
 
 @dataclass(frozen=True)
 class Announcement:
-    """A checked text for the teams of a split."""
-
     split: Split
     subject: str
     text: str
 
     @property
     def mailed(self) -> tuple[str, str]:
-        """Subject and text as people get them."""
+        """Return subject and text of the mail."""
         return notices.framed(subject=self.subject, text=self.text)
 
     def key(self, user_id: int) -> str:
-        """What keeps a person from getting it twice."""
+        # A person gets each announcement once.
         digest = hashlib.sha256(f"{self.subject}\n{self.text}".encode()).hexdigest()
         return f"announcement:{self.split.pk}:{digest[:16]}:{user_id}"
 
 
 def written(*, split: Split, subject: str, text: str) -> Announcement:
-    """An announcement; its subject is one line. Raises `Refused` for what is empty or too long."""
+    """Check an announcement. Raises `Refused` for what is empty or too long."""
     subject = " ".join(clean_text("subject", subject, limit=MAX_SUBJECT).split())
     text = clean_text("text", text.replace("\r\n", "\n"), limit=MAX_TEXT)
     return Announcement(split, subject, text)
 
 
 def left(announcement: Announcement) -> list[User]:
-    """Users who would get it now: they want announcements, their team sent a file, they have not got it."""
+    """Return users who want announcements, whose team sent a file, and who have not got this one."""
     people = notices.readers(MailKind.ANNOUNCEMENT).filter(notices.has_sent_to(announcement.split))
     keys = {user: announcement.key(user.pk) for user in people}
     sent_keys = set(Mail.objects.filter(key__in=keys.values()).values_list("key", flat=True))
@@ -51,7 +49,7 @@ def left(announcement: Announcement) -> list[User]:
 
 
 def announce(announcement: Announcement, *, now: datetime, actor: User | None) -> int:
-    """Queue it for all who have not got it; returns for how many. Raises `NotMaintainer`."""
+    """Queue an announcement for all who have not got it. Returns how many. Raises `NotMaintainer`."""
     require_maintainer(actor, to="mail the teams of a split")
     with transaction.atomic():
         split = Split.objects.select_for_update(no_key=True).filter(pk=announcement.split.pk).first()

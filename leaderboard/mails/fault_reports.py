@@ -1,4 +1,4 @@
-"""Faults of ours by mail to `TSTTC_ERROR_EMAILS`: what the log says of them, each once an hour.
+"""Faults by mail to `TSTTC_ERROR_EMAILS`, each once an hour.
 
 Named by path in Django's `LOGGING`, so it is imported before there are models.
 """
@@ -16,10 +16,9 @@ _MAX_CHARACTERS: Final = 20_000
 
 
 class FaultReportHandler(logging.Handler):
-    """Puts a line of the log, without secrets, into the outbox. A fault there never raises another."""
+    """Puts a line of the log into the outbox. A fault there never raises another."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Queue one mail for each person, unless the same fault was reported within the hour."""
         try:
             self._queue(self.format(record), origin=f"{record.name}:{record.lineno}", now=timezone.now())
         except Exception:  # noqa: BLE001 - logging's own rule: whatever fails, the caller goes on

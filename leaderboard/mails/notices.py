@@ -1,8 +1,4 @@
-"""Notices: mails about events, each sent once, unless the person has switched them off.
-
-Workers find them in the tables. A notice goes to members of the team that owns what it is about, and names
-nothing of any other team.
-"""
+"""Notices: mails about events to members of one team, each sent once, unless switched off."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -41,7 +37,7 @@ _OUTCOMES: Final = {
 
 
 def queue_due(*, now: datetime) -> None:
-    """Queue a mail for everything that has happened since the last look, or will happen soon."""
+    """Queue a mail for every event since the last run, and for those that are due soon."""
     last = SweepBeat.objects.values_list("notices_at", flat=True).first()
     # Without a last look there is nothing that anybody waits to be told.
     since = max(last - _OVERLAP, now - _NEWS) if last else now
@@ -55,7 +51,7 @@ def queue_due(*, now: datetime) -> None:
 
 
 def readers(kind: MailKind) -> QuerySet[User]:
-    """Users who get mails of a kind: active, with a proved address, and have not switched it off."""
+    """Return active users with a proved address who want mails of this kind."""
     people = User.objects.filter(is_active=True)
     if settings.ACCOUNT_EMAIL_VERIFICATION == "mandatory":
         proved = EmailAddress.objects.filter(
@@ -67,12 +63,11 @@ def readers(kind: MailKind) -> QuerySet[User]:
 
 
 def muted_by(user: User) -> set[str]:
-    """The kinds that a person has switched off."""
     return set(user.muted_kinds.split())
 
 
 def choose(*, user: User, wanted: Iterable[str]) -> None:
-    """Send this person mails of these kinds, and of no others but those about the account."""
+    """Switch on mails of these kinds alone, and those about the account."""
     unwanted = set(MailKind.values) - {MailKind.ACCOUNT.value} - set(wanted)
     user.muted_kinds = " ".join(sorted(unwanted))
     user.save(update_fields=["muted_kinds"])
@@ -82,7 +77,7 @@ def choose(*, user: User, wanted: Iterable[str]) -> None:
 
 
 def _scored(since: datetime, now: datetime) -> Iterator[Mail]:
-    """Outcomes of files that people sent on the site; a program asks for its own."""
+    # Outcomes of files that people sent on the site; a program asks for its own.
     decided = (
         Evaluation.objects.filter(
             finished_at__gt=since,
@@ -111,7 +106,6 @@ def _scored(since: datetime, now: datetime) -> Iterator[Mail]:
 
 
 def _editions(since: datetime, now: datetime) -> Iterator[Mail]:
-    """Boards that moved to another edition, for the teams that have an entry there."""
     for publication in Publication.objects.filter(at__gt=since, at__lte=now).exclude(replaced=None):
         scored = Submission.objects.filter(
             withdrawn_at=None, evaluations__edition=publication.replaced, evaluations__status=Status.SCORED
@@ -135,7 +129,6 @@ def _editions(since: datetime, now: datetime) -> Iterator[Mail]:
 
 
 def _tokens(now: datetime) -> Iterator[Mail]:
-    """Tokens that end soon and still work."""
     ending = ApiToken.objects.filter(
         revoked_at=None,
         expiry__gt=now,
@@ -155,7 +148,6 @@ def _tokens(now: datetime) -> Iterator[Mail]:
 
 
 def _deadlines(now: datetime) -> Iterator[Mail]:
-    """Splits that close soon, for the teams that have sent a file to them."""
     for split in Split.objects.filter(closes_at__gt=now, closes_at__lte=now + CLOSES_WITHIN):
         at = f"{split.closes_at:%Y-%m-%d at %H:%M} UTC"
         text = f"{split.pk} closes on {at}. After that no file is taken.\n\n{_link('board', split.pk)}"
@@ -166,13 +158,13 @@ def _deadlines(now: datetime) -> Iterator[Mail]:
 
 
 def has_sent_to(split: Split) -> Exists:
-    """Of a person: whether their team has sent a file to the split that is not withdrawn."""
+    """Make a condition on users: their team has an active submission to the split."""
     sent = Submission.objects.filter(split=split, withdrawn_at=None, method__team__members=OuterRef("pk"))
     return Exists(sent)
 
 
 def framed(*, subject: str, text: str) -> tuple[str, str]:
-    """Subject and text of a notice as they are mailed: of this site, with the way to switch it off below."""
+    """Frame subject and text with the site's name and the link to switch notices off."""
     footer = f"--\n{settings.SITE_NAME}\n{settings.SITE_URL}\nChoose which mails you get: {_link('mails')}"
     return f"[{settings.SITE_NAME}] {subject}", f"{text}\n\n{footer}\n"
 

@@ -1,7 +1,7 @@
-"""The outbox: a mail that the server does not take is kept, and sent later.
+"""The outbox: keep what the mail server does not take, and send it later.
 
-Mails of accounts are tried at once; all others wait for the workers' sweep, or for `manage.py send_mails`. A
-mail is sent at least once: who dies between sending and writing it down sends it again.
+Mails of accounts are tried at once; others wait for the workers' sweep or `manage.py send_mails`. Each is
+sent at least once: a crash between sending and saving sends it again.
 """
 
 import smtplib
@@ -28,7 +28,7 @@ KEPT: Final = timedelta(days=30)
 
 
 def send_or_keep(*, message: EmailMessage, now: datetime) -> None:
-    """Send a mail to one person now, or keep it for later; never fails for it."""
+    """Send a mail to one person now, or keep it; never fails."""
     if _sent(message):
         return
     [recipient] = message.to
@@ -43,7 +43,7 @@ def send_or_keep(*, message: EmailMessage, now: datetime) -> None:
 
 
 def tell(*, kind: MailKind, user: User, key: str, subject: str, text: str, now: datetime) -> Mail:
-    """A notice to be queued with `queue`; the subject is one line whatever names are in it."""
+    """Make a notice for `queue`, with a subject of one line."""
     return Mail(
         kind=kind,
         user=user,
@@ -57,17 +57,16 @@ def tell(*, kind: MailKind, user: User, key: str, subject: str, text: str, now: 
 
 
 def queue(mails: list[Mail]) -> None:
-    """Queue notices; one whose key is known already is left out."""
+    """Queue notices; skip known keys."""
     Mail.objects.bulk_create(mails, ignore_conflicts=True)
 
 
 def waiting() -> int:
-    """How many mails wait to be sent."""
     return Mail.objects.filter(ended_at=None).count()
 
 
 def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) -> int:
-    """Send what is due until one fails, the oldest first. Returns how many were sent."""
+    """Send what is due, oldest first, until one fails. Returns how many were sent."""
     n_sent = 0
     for mail in Mail.objects.filter(ended_at=None, due_at__lte=now).order_by("due_at")[:MAX_AT_ONCE]:
         if is_stopping():
@@ -91,7 +90,7 @@ def purge(*, now: datetime) -> int:
 
 
 def _end(mail: Mail, *, now: datetime, is_sent: bool) -> None:
-    """Clear the mail's text and recipient: links in it open accounts, and addresses are private."""
+    # Links in the text open accounts, and addresses are private.
     ended = {"recipient": "", "subject": "", "text": "", "ended_at": now, "is_sent": is_sent}
     Mail.objects.filter(pk=mail.pk).update(**ended)
     if not is_sent:
