@@ -1,4 +1,4 @@
-"""What commands share: refusals in one line, in the words of the function that refuses, and arguments."""
+"""Arguments and refusals that commands share."""
 
 from argparse import ArgumentParser
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ class RefusingCommand(BaseCommand):
     """A command whose function may refuse its arguments, or the ground truth at `path` or `truth`."""
 
     def execute(self, *args: Any, **options: Any) -> str | None:
-        """Run it. Raises `CommandError` for what was refused."""
+        # Refusals become `CommandError`, in the words of the function that refuses.
         try:
             return super().execute(*args, **options)
         except Rejected as rejected:
@@ -29,13 +29,11 @@ class AccountCommand(RefusingCommand):
     """A command about the account of EMAIL that asks for a reason."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """EMAIL, reason."""
         parser.add_argument("email", help="address of the account")
         parser.add_argument("--reason", required=True, help="a sentence for the audit log, without names")
 
 
 def account_of(options: Mapping[str, Any]) -> User:
-    """The account of EMAIL. Raises `CommandError`."""
     user = User.objects.filter(email=options["email"].strip().lower()).first()
     if user is None:
         raise CommandError("There is no account with that address; expected the primary address of one.")

@@ -1,6 +1,6 @@
-"""The registry of method details: what a team states of a method in fields of its own, one row each.
+"""The registry of method details: forms, filters, API, exports and pages follow from its rows.
 
-Forms, filters, API, exports and pages follow from the row. Free texts of an anonymous method are hidden.
+Free texts of an anonymous method are hidden.
 """
 
 import math
@@ -33,7 +33,7 @@ def bad_value(name: str, given: object, expected: str, *, advice: str = "") -> R
 
 
 def text_of(name: str, value: object) -> str:
-    """A text as it was sent; None is an empty one. Raises `Refused`."""
+    """Return a text; None becomes empty. Raises `Refused`."""
     if value is None:
         return ""
     if not isinstance(value, str):
@@ -45,7 +45,7 @@ def text_of(name: str, value: object) -> str:
 
 
 class Option(NamedTuple):
-    """A value to choose: in forms and addresses, as it is stored, and in words."""
+    """A choice: in forms and addresses, as stored, and in words."""
 
     text: str
     value: object
@@ -54,7 +54,7 @@ class Option(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Kind:
-    """Which values a detail can have, and which of them a filter admits."""
+    """The values that a detail can have, and how a filter compares them."""
 
     is_free_text: ClassVar[bool] = True  # unless a kind denies it: then others see it of an anonymous method
     filter_label: ClassVar[str] = "{}"  # around the detail's own
@@ -67,11 +67,11 @@ class Kind:
 
     @property
     def empty(self) -> str | None:
-        """The value of a detail that is not specified."""
+        """Return the value of a detail that is not specified."""
         return "" if self.type is str else None
 
     def clean(self, name: str, value: object) -> Any:
-        """The value that a text or a JSON value means; `name` is the field's. Raises `Refused`."""
+        """Convert a text or a JSON value; `name` is the field's. Raises `Refused`."""
         if value is None or value == "":
             return self.empty
         try:
@@ -80,24 +80,23 @@ class Kind:
             raise bad_value(name, value, self.expected, advice=self.advice) from None
 
     def read(self, value: object) -> Any:
-        """The same of what is not empty. Raises `ValueError`."""
+        """Convert a value that is not empty. Raises `ValueError`."""
         raise NotImplementedError
 
     def words(self, value: Any) -> str:
-        """A value as a page shows it."""
         return str(value)
 
     def wanted(self, text: str) -> Any:
-        """The value that a filter asks for. Raises `ValueError`."""
+        """Convert the text of a filter. Raises `ValueError`."""
         raise NotImplementedError
 
     def admits(self, wanted: Any, stated: Any) -> bool:
-        """Whether a row that states this passes the filter; one that states nothing passes none."""
+        """Tell whether a stated value passes the filter."""
         return bool(wanted == stated)
 
 
 class Listed(Kind):
-    """One of a few values; a filter asks for one of them."""
+    """A choice of a few values; a filter asks for one."""
 
     is_free_text = False
 
@@ -115,7 +114,7 @@ class Listed(Kind):
 
 
 class Number(Kind):
-    """A number; a filter asks for at most so much."""
+    """A number; a filter asks for at most this."""
 
     is_free_text = False
     filter_label = "Max {}"
@@ -167,7 +166,7 @@ class Measured(Number):
 
 
 class FreeText(Kind):
-    """Words of the team's own; a filter asks for a part of them, whatever their case."""
+    """Free text; a filter asks for a part of it, in any case."""
 
     filter_label = "{} contains"
 
@@ -182,7 +181,7 @@ class FreeText(Kind):
 
 
 def count_of(text: str) -> Decimal:
-    """The number that a text means, which may have a part behind the point. Raises `ValueError`.
+    """Parse a number like 25M. Raises `ValueError`.
 
     >>> [int(count_of(text)) for text in ("25M", "25,000,000", "0.4 m", "7")]
     [25000000, 25000000, 400000, 7]
@@ -228,7 +227,7 @@ def whole(low: int, high: int) -> Whole:
 
 
 def measured(unit: str) -> Measured:
-    """A number of some unit, named in the plural."""
+    """Make the kind of a number with a unit, named in the plural."""
     return Measured(
         type=float,
         expected=f"{unit} above 0, or nothing",
@@ -247,7 +246,7 @@ def free_text(limit: int) -> FreeText:
 
 @dataclass(frozen=True, kw_only=True)
 class Detail:
-    """One detail: `name` is that of the field of `Method` and of the API, `filter` that in addresses."""
+    """A detail; `name` is the field of `Method` and of the API, `filter` the parameter of addresses."""
 
     name: str
     kind: Kind
@@ -259,13 +258,13 @@ class Detail:
 
     @property
     def filter_label(self) -> str:
-        """What the filter is called on pages: "Max latency (ms)"."""
+        """Return the label of the filter, as "Max latency (ms)"."""
         around = self.kind.filter_label
         return around.format(self.label if around.startswith("{") else self.label.lower())
 
     @property
     def meaning(self) -> str:
-        """What the field of the API means, and its empty value."""
+        """Describe the field for the API's schema."""
         values = [value for value, _ in self.kind.limits.get("choices", ())]
         one_of = f" One of {', '.join(values)}." if values else ""
         empty = "Null" if self.kind.empty is None else "Empty"
@@ -351,26 +350,18 @@ DETAILS: tuple[Detail, ...] = (
 
 
 def stated(**values: Any) -> Details:
-    """The details with these values and no others.
-
-    >>> {name: value for name, value in stated(n_frames=6).items() if value}
-    {'n_frames': 6}
-    """
+    """Return all details, empty but for these values."""
     return {detail.name: values.get(detail.name, detail.kind.empty) for detail in DETAILS}
 
 
 def details_of(method: Method, *, is_masked: bool = False) -> Details:
-    """The details of a method; masked: without free texts."""
+    """Return the details of a method; masked: without free texts."""
     shown = (each.name for each in DETAILS if not (is_masked and each.kind.is_free_text))
     return stated(**{name: getattr(method, name) for name in shown})
 
 
 def words(details: Details) -> tuple[tuple[str, str], ...]:
-    """The details that are specified, each with its label.
-
-    >>> words(stated(n_frames=6, uses_nerf=False, latency_ms=41.5, hardware="one GPU"))
-    (('Frames used', '6'), ('NeRF-augmented data', 'no'), ('Latency (ms)', '41.5'), ('Hardware', 'one GPU'))
-    """
+    """Return label and words of each specified detail."""
     return tuple(
         (each.label, each.kind.words(details[each.name]))
         for each in DETAILS

@@ -1,4 +1,4 @@
-"""Methods: a team's approaches and their details, edited by the team."""
+"""Methods, edited by their team."""
 
 from collections.abc import Callable, Mapping
 from datetime import datetime
@@ -51,7 +51,7 @@ def edit(
 
 
 def cleaned(changes: Mapping[str, object]) -> dict[str, Any]:
-    """The values that these texts and values mean, by field. Raises `Refused`."""
+    """Convert values of a form or the API, by field. Raises `Refused`."""
     unknown = next((name for name in changes if name not in _CLEANERS), None)
     if unknown is not None:
         raise Refused(
@@ -62,12 +62,11 @@ def cleaned(changes: Mapping[str, object]) -> dict[str, Any]:
 
 
 def is_of(method: Method, user: User) -> bool:
-    """Whether the method is this person's team's."""
     return method.team.memberships.filter(user=user).exists()
 
 
 def require_team(method: Method, actor: User) -> None:
-    """Raise `Refused` for anybody but the method's own team."""
+    """Raise `Refused` unless the actor is in the method's team."""
     if not is_of(method, actor):
         raise Refused("not-yours", "Only the team of a method can change its details.")
 
@@ -75,9 +74,9 @@ def require_team(method: Method, actor: User) -> None:
 def require_distinct_name(
     name: str, *, team: Team, field: str, but: Method | None = None, may_exist: bool = False
 ) -> None:
-    """Raise `Refused` for a name that looks like that of another of the team's methods.
+    """Raise `Refused` for a name that looks like that of another method of the team.
 
-    With `may_exist`, a method of this very name is no other one: another request may just be making it.
+    `may_exist` allows this very name: another request may just create it.
     """
     others = Method.objects.existing().filter(team=team)
     if but is not None:
@@ -107,7 +106,7 @@ def _require_sound(method: Method, changed: Mapping[str, Any]) -> None:
 
 
 def require_hardware(changed: Mapping[str, Any], *, method: Method | None) -> None:
-    """Raise `Refused` for a latency without hardware; `method` is what the changes stand on, if any."""
+    """Raise `Refused` for a latency without hardware."""
     before = method or Method()
     latency_ms = changed.get("latency_ms", before.latency_ms)
     if latency_ms is not None and not changed.get("hardware", before.hardware):
@@ -134,7 +133,7 @@ FIELDS = tuple(_CLEANERS)
 
 
 def name_meant(*, user: User, text: str) -> str:
-    """The name of the person's own method that a name or id means. Raises `Refused` for another's id."""
+    """Return the name for a name or id of the person's own method. Raises `Refused` for another's id."""
     text = text.strip()
     try:
         pk = UUID(text) if len(text) == UUID_CHARACTERS else None

@@ -1,10 +1,10 @@
-"""Visibility: who sees a method. It is private until its team decides otherwise, which it does on purpose.
+"""Visibility: who sees a method. It is private until its team shows it, which cannot be taken back.
 
     private  -> anonymous   everybody sees the numbers, under a pseudonym
-    private  -> public      everybody sees everything, for good
-    anonymous -> public     at once, or at a moment that was named
+    private  -> public      everybody sees everything
+    anonymous -> public     at once, or at a set time
 
-There is no way back: whoever could hide bad numbers again would show good ones only.
+A way back would let teams hide bad numbers.
 """
 
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ MAX_ANONYMITY = timedelta(days=730)
 
 
 def choices(method: Method) -> tuple[Visibility, ...]:
-    """What it can become: further than it is, or anonymous with another date."""
+    """Return the visibilities that are possible next; an anonymous method may get another date."""
     if method.visibility == Visibility.PUBLIC:
         return ()
     return (Visibility.ANONYMOUS, Visibility.PUBLIC)
@@ -35,9 +35,9 @@ def choices(method: Method) -> tuple[Visibility, ...]:
 def change(
     *, method: Method, visibility: str, actor: User, now: datetime, reveal_at: datetime | None = None
 ) -> Method:
-    """Show a method to everybody, under its pseudonym or its name, which cannot be taken back.
+    """Show a method under its pseudonym or its name, which cannot be taken back.
 
-    An anonymous one turns public by itself at `reveal_at`, if that is given. Raises `Refused`.
+    An anonymous one turns public at `reveal_at`, if given. Raises `Refused`.
     """
     with transaction.atomic():
         teams.locked(method.team)
@@ -69,7 +69,7 @@ def change(
 
 
 def require_possible(method: Method, *, visibility: str, reveal_at: datetime | None, now: datetime) -> None:
-    """Raise `Refused` for what a method cannot become."""
+    """Raise `Refused` for an impossible change."""
     if visibility not in (Visibility.ANONYMOUS, Visibility.PUBLIC):
         raise Refused(
             "bad-value",
@@ -102,7 +102,7 @@ def require_possible(method: Method, *, visibility: str, reveal_at: datetime | N
 
 
 def notice_of(method: Method) -> str:
-    """Who sees the results of a method, in a sentence; empty if private."""
+    """Say who sees the results of a method; empty if private."""
     if method.visibility == Visibility.PUBLIC:
         return f"{method.name} is public: everyone sees its results on every split."
     if method.visibility == Visibility.ANONYMOUS:
@@ -114,7 +114,7 @@ def notice_of(method: Method) -> str:
 
 
 def reveal_due(*, now: datetime) -> int:
-    """Make public what was to be public by now. Returns how many; of two that do this at once, one does."""
+    """Make public what is due. Returns how many; safe against a second process."""
     due = Method.objects.filter(visibility=Visibility.ANONYMOUS, reveal_at__lte=now)
     n_revealed = 0
     for method_id in list(due.values_list("pk", flat=True)):
@@ -144,7 +144,6 @@ def _require_name_of_its_own(method: Method) -> None:
 
 
 def _number_taken_name(method: Method) -> None:
-    """Add a number to the name of a method that becomes public by itself, where the name is taken."""
     before = method.name
     own = Method.objects.existing().filter(team=method.team_id).exclude(pk=method.pk)
     names_of_team = list(own.values_list("name", flat=True))

@@ -1,4 +1,4 @@
-"""Who did what to what, when: rows that stay as they are, sealed into a chain of hashes soon after."""
+"""The audit log: append-only rows, sealed into a chain of hashes."""
 
 import hashlib
 import json
@@ -20,7 +20,7 @@ GENESIS = "0" * 64
 
 
 class AppendOnly(Exception):
-    """Audit events are written once and stay."""
+    """Audit events cannot be changed or deleted."""
 
     def __init__(self) -> None:
         super().__init__("Audit events are append-only: they are neither changed nor deleted.")
@@ -36,7 +36,7 @@ def chained_hash(
     noun_id: str,
     details: Mapping[str, Any],
 ) -> str:
-    """SHA-256 of the hash before and of all that this event says. Never changes: old chains must hold."""
+    """Hash an event and the hash before it, by SHA-256. Never change it: old chains must hold."""
     content = {
         "at": at.astimezone(UTC).isoformat(timespec="microseconds"),
         "actor": actor_id,
@@ -51,26 +51,22 @@ def chained_hash(
 
 @dataclass(frozen=True)
 class Unsealed:
-    """Events that are in no chain yet: how many, and how long the oldest has been there."""
+    """How many events are not sealed, and the age of the oldest."""
 
     n_events: int
     oldest_age_s: float
 
 
 class AuditEventQuerySet(models.QuerySet["AuditEvent"]):
-    """Reads and appends only. On PostgreSQL a trigger refuses changes by others too."""
-
+    # On PostgreSQL a trigger refuses changes by others too.
     def unsealed(self) -> Unsealed:
-        """What the next sweep is to seal, by the database's clock."""
         totals = self.filter(hash=None).aggregate(n=Count("pk"), age=Now() - Min("at"))
         return Unsealed(totals["n"], max(0.0, totals["age"].total_seconds()) if totals["age"] else 0.0)
 
     def update(self, **kwargs: Any) -> NoReturn:
-        """Refused."""
         raise AppendOnly
 
     def delete(self) -> NoReturn:
-        """Refused."""
         raise AppendOnly
 
     def _update(self, values: Any) -> NoReturn:
@@ -83,7 +79,7 @@ class AuditEventQuerySet(models.QuerySet["AuditEvent"]):
 
 
 class AuditText(models.Model):
-    """A name that an event speaks of. The event has its id; the text can be blanked, and no hash notices."""
+    """A name in an event. It can be blanked without a change of any hash."""
 
     id = models.UUIDField(primary_key=True, default=uuid.uuid4, editable=False)
     text = models.CharField(max_length=300, blank=True, help_text="Empty: blanked.")
@@ -132,11 +128,10 @@ class AuditEvent(models.Model):
         return f"{self.at:%Y-%m-%d %H:%M:%S} {self.verb} {self.noun} {self.noun_id}"
 
     def delete(self, *args: Any, **kwargs: Any) -> NoReturn:
-        """Refused."""
         raise AppendOnly
 
     def hash_after(self, previous_hash: str) -> str:
-        """The hash that what the event says has in a chain, after this one."""
+        """Return the hash of this event after the one before."""
         return chained_hash(
             previous_hash=previous_hash,
             at=self.at,

@@ -1,4 +1,4 @@
-"""What is competed on: splits, revisions of their ground truth, editions, and rows printed in papers."""
+"""Splits, ground truths, editions, and published results."""
 
 from datetime import UTC, datetime
 from typing import ClassVar, Self
@@ -22,25 +22,21 @@ NO_TEXT = "The announcement has no text; expected a text beside its end."
 
 
 class Listing(models.TextChoices):
-    """Where a split is found."""
-
     LISTED = "LISTED", "listed"
     ARCHIVED = "ARCHIVED", "archived"
     OFF = "OFF", "switched off"
 
 
 class SplitQuerySet(models.QuerySet["Split"]):
-    """Questions about splits."""
-
     def shown(self) -> Self:
-        """Those that are on pages, in forms and in the API: all that are not switched off."""
+        """Return splits that are not switched off."""
         return self.exclude(listing=Listing.OFF)
 
     def lock_shared(self, name: str) -> "Split":
-        """Lock the split against changes until the transaction ends; other readers may lock it as well.
+        """Lock the split in shared mode until the transaction ends.
 
-        A submission holds it so, and whoever opens, publishes or rolls back an edition holds it alone: no
-        submission can slip between an edition's opening and its list of what to score.
+        A submission locks it so and a change of editions locks it alone: no submission can slip between
+        an edition's opening and its list of what to score.
         """
         if connection.features.has_select_for_update:
             with connection.cursor() as cursor:
@@ -50,7 +46,7 @@ class SplitQuerySet(models.QuerySet["Split"]):
 
 
 class Split(QuotaRules):
-    """A part of the dataset with its own policy and its own board."""
+    """A part of the dataset with its policy and board."""
 
     name = models.SlugField(max_length=32, primary_key=True)
     title = models.CharField(max_length=80)
@@ -126,7 +122,7 @@ class Split(QuotaRules):
         return self.name
 
     def clean(self) -> None:
-        """Raise `ValidationError` for rules that make no sense, alone or with the split it shares with."""
+        """Raise `ValidationError` for rules that make no sense."""
         super().clean()
         if self.announcement and self.announcement_ends_at is None:
             raise ValidationError({"announcement_ends_at": NO_END})
@@ -142,7 +138,6 @@ class Split(QuotaRules):
             )
 
     def faults(self) -> dict[str, str]:
-        """The same, and of its times."""
         faults = super().faults()
         if self.opens_at and self.closes_at and self.opens_at >= self.closes_at:
             faults["closes_at"] = (
@@ -152,28 +147,26 @@ class Split(QuotaRules):
         return faults
 
     def announcement_at(self, now: datetime) -> str:
-        """The line that its pages show at this moment; empty if there is none, or if it has ended."""
         ends_at = self.announcement_ends_at
         return self.announcement if ends_at is not None and now < ends_at else ""
 
     @property
     def is_archived(self) -> bool:
-        """Whether its board stays and it takes nothing any more."""
         return self.listing == Listing.ARCHIVED
 
     @property
     def truth_split_id(self) -> str:
-        """The split that its ground truth belongs to: itself, or the one that it shares with."""
+        """Return the split that owns the ground truth: itself, or the one that it shares with."""
         return self.same_truth_as_id or self.pk
 
     @property
     def has_ground_truth(self) -> bool:
-        """Whether there is something to score against; `quotas.admissions` says when files are taken."""
+        """Tell whether there is ground truth; `quotas.admissions` says when files are taken."""
         return self.current_edition_id is not None
 
 
 class GroundTruth(models.Model):
-    """One revision of the hidden values, named by its digest. The values themselves are never here."""
+    """A revision of a split's labels, named by its digest. The values are never in the database."""
 
     digest = models.CharField(max_length=80, primary_key=True)
     manifest_digest = models.CharField(max_length=80, db_index=True)
@@ -190,23 +183,17 @@ class GroundTruth(models.Model):
 
     @property
     def short_digest(self) -> str:
-        """The first eight digits of the digest, for people."""
         return self.digest.removeprefix("sha256:")[:8]
 
 
 class TruthComparisonQuerySet(models.QuerySet["TruthComparison"]):
-    """Questions about comparisons of ground truths."""
-
     def between(self, one: GroundTruth, other: GroundTruth) -> Self:
-        """The comparisons of these two, in either direction."""
+        """Return comparisons of these two, in either direction."""
         return self.filter(models.Q(old=one, new=other) | models.Q(old=other, new=one))
 
 
 class TruthComparison(models.Model):
-    """By how many sequences one ground truth differs from another.
-
-    Counted where the values are at hand; the values themselves are told to nobody.
-    """
+    """The number of sequences by which two ground truths differ, counted where the values are."""
 
     old = models.ForeignKey(GroundTruth, on_delete=models.PROTECT, related_name="+")
     new = models.ForeignKey(GroundTruth, on_delete=models.PROTECT, related_name="comparisons")
@@ -227,7 +214,7 @@ class TruthComparison(models.Model):
 
 
 class Edition(UnitOfInference):
-    """Ground truth, protocol and decimals of a split: the frame in which a ranking lives."""
+    """A ground truth, protocol and decimals of a split."""
 
     split = models.ForeignKey(Split, on_delete=models.PROTECT, related_name="editions")
     number = models.PositiveIntegerField()
@@ -277,19 +264,14 @@ class Edition(UnitOfInference):
 
     @property
     def rules(self) -> Protocol:
-        """Its protocol, which says what metrics and TTC ranges there are."""
         return get_protocol(self.protocol)
 
     @property
     def is_in_preparation(self) -> bool:
-        """Whether it is neither published nor given up."""
         return self.published_at is None and self.discarded_at is None
 
     def ended_at(self, split: Split) -> datetime | None:
-        """When a former edition last stopped being the board; None of the board and of one that never was.
-
-        `split` is the edition's own, with its published edition as of now.
-        """
+        """Return when a former edition last stopped being the board."""
         if self.published_at is None or split.current_edition_id == self.pk:
             return None
         ends = Publication.objects.filter(replaced=self).order_by("-at", "-pk")
@@ -297,11 +279,9 @@ class Edition(UnitOfInference):
 
 
 class Publication(models.Model):
-    """That an edition became the board of its split: the public changelog. Append-only."""
+    """The public changelog: an edition became the board of its split. Append-only."""
 
     class Kind(models.TextChoices):
-        """Forward to a new edition, or back to a former one."""
-
         PUBLISHED = "PUBLISHED", "published"
         ROLLED_BACK = "ROLLED_BACK", "rolled back"
 
@@ -323,13 +303,10 @@ class Publication(models.Model):
 
 
 class PublishedResultQuerySet(models.QuerySet["PublishedResult"]):
-    """Questions about quoted rows."""
-
     def on_board(self, split: Split, edition: Edition | None, *, at: datetime | None = None) -> Self:
-        """The rows that stand on a board, or stood on it at a time when `edition` was it, in their order.
+        """Return the rows on a board now, or at a time when `edition` was the board, in order.
 
-        A former edition keeps the rows that stood when it last stopped being the board: what is added,
-        replaced or taken away later never changes it.
+        A former edition keeps its rows for ever.
         """
         rows = self.filter(split=split).order_by("pk")
         as_of = edition.ended_at(split) if at is None and edition is not None else at
@@ -339,9 +316,9 @@ class PublishedResultQuerySet(models.QuerySet["PublishedResult"]):
 
 
 class PublishedResult(models.Model):
-    """A row quoted from a paper: ranked with the submissions, marked, never re-scored.
+    """A row quoted from a paper: ranked and marked, never re-scored.
 
-    A row that is corrected is not changed but replaced by another one, so that boards of the past stay.
+    A corrected row is a new one, so that boards of the past stay.
     """
 
     split = models.ForeignKey(Split, on_delete=models.PROTECT, related_name="published_results")

@@ -1,4 +1,4 @@
-"""The number that says whether what is kept of a split's boards holds."""
+"""The version of a split's boards."""
 
 from django.db import models
 
@@ -6,7 +6,7 @@ from leaderboard.models.benchmark import Split
 
 
 class BoardVersion(models.Model):
-    """Counts changes of a split's boards. A separate row, so that submitting does not wait for its lock."""
+    """Counts changes of a split's boards; a row of its own, so that submitting does not wait for its lock."""
 
     split = models.OneToOneField(
         Split, primary_key=True, on_delete=models.CASCADE, related_name="board_version"

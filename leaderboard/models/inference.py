@@ -1,4 +1,4 @@
-"""What the workers make of scores beyond the scores: rank ranges, comparisons, and analyses for owners."""
+"""Rank ranges, comparisons, and analyses for owners."""
 
 from django.db import models
 from django.utils import timezone
@@ -8,7 +8,7 @@ from leaderboard.models.submissions import Evaluation
 
 
 class EditionRanges(models.Model):
-    """The rank ranges of an edition's ranked entries, all in one row: one entry more moves most of them."""
+    """The rank ranges of an edition in one row: a new entry moves most of them."""
 
     edition = models.OneToOneField(
         Edition, on_delete=models.CASCADE, primary_key=True, related_name="rank_ranges"
@@ -27,10 +27,7 @@ class EditionRanges(models.Model):
 
 
 class Comparison(models.Model):
-    """The difference between two entries of an edition, asked for by a reader and answered by a worker.
-
-    Recordings are compared, and their values are the worker's alone; interval aggregates stand here.
-    """
+    """The difference between two entries of an edition, asked for by a reader and computed by a worker."""
 
     edition = models.ForeignKey(Edition, on_delete=models.CASCADE, related_name="comparisons")
     first = models.ForeignKey(Evaluation, on_delete=models.CASCADE, related_name="+")
@@ -60,7 +57,7 @@ class Comparison(models.Model):
 
 
 class Analysis(models.Model):
-    """What the owner of an entry on an open split may look at more closely. Never of a hidden split."""
+    """An error analysis for the owner of an entry. Never of a hidden split."""
 
     evaluation = models.OneToOneField(Evaluation, on_delete=models.CASCADE, related_name="analysis")
     content = models.JSONField(help_text="Error by time to contact, distribution, scatter, worst recordings.")

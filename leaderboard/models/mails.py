@@ -1,4 +1,4 @@
-"""Mails that wait to be sent."""
+"""Mails to be sent."""
 
 from django.db import models
 from django.db.models import Q
@@ -8,7 +8,7 @@ from leaderboard.models.people import User
 
 
 class MailKind(models.TextChoices):
-    """What a mail is about. Every kind but the first can be switched off by the person."""
+    """What a mail is about. A person can switch off every kind but the first."""
 
     ACCOUNT = "account", "Your account"
     SCORED = "scored", "A file that I sent on the site is scored or rejected"
@@ -19,7 +19,7 @@ class MailKind(models.TextChoices):
 
 
 class Mail(models.Model):
-    """One mail to one person: to be sent, or sent. Once it is, nothing of it stays but that it was."""
+    """A mail to one person. Once it is sent, its text and recipient are cleared."""
 
     kind = models.CharField(max_length=16, choices=MailKind)
     user = models.ForeignKey(User, null=True, blank=True, on_delete=models.CASCADE, related_name="+")

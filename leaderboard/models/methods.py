@@ -1,4 +1,4 @@
-"""Methods: a team's named approaches, their details, and their visibility."""
+"""Methods: their details and their visibility."""
 
 import uuid
 from datetime import datetime
@@ -18,40 +18,29 @@ FINITE = 1e300
 
 
 class Visibility(models.TextChoices):
-    """Who may see a method: its team, everybody under a pseudonym, or everybody."""
-
     PRIVATE = "PRIVATE", "private"
     ANONYMOUS = "ANONYMOUS", "anonymous"
     PUBLIC = "PUBLIC", "public"
 
 
 class Cameras(models.TextChoices):
-    """How many views of a scene a method takes."""
-
     ONE = "ONE", "one camera"
     SEVERAL = "SEVERAL", "several cameras"
 
 
 class BoxSource(models.TextChoices):
-    """Where a method has the object's box from."""
-
     GIVEN = "GIVEN", "provided"
     DETECTED = "DETECTED", "own detector"
     NONE = "NONE", "none"
 
 
 class MethodQuerySet(models.QuerySet["Method"]):
-    """Questions about methods."""
-
     def existing(self) -> Self:
-        """Methods that their team has not deleted."""
+        """Return methods that their team has not deleted."""
         return self.filter(deleted_at=None)
 
     def shown(self, *, at: datetime | None = None) -> Self:
-        """Methods that everybody sees, under their name or a pseudonym; with `at` those shown by then.
-
-        Anonymous ones by the end of that day (see leaderboard/models/days.py).
-        """
+        """Return methods that everybody sees, under their name or a pseudonym, now or as of `at`."""
         rows = self.exclude(visibility=Visibility.PRIVATE)
         if at is None:
             return rows
@@ -59,15 +48,14 @@ class MethodQuerySet(models.QuerySet["Method"]):
         return rows.filter(by_then | Q(shown_at__lte=at))
 
     def of(self, user: User | AnonymousUser) -> Self:
-        """Methods of the person's own team."""
         if not user.is_authenticated:
             return self.none()
         return self.existing().filter(team__in=Membership.objects.filter(user=user).values("team"))
 
     def visible_to(self, user: User | AnonymousUser) -> Self:
-        """What everybody sees, and the person's own team's; maintainers see all.
+        """Return what everybody sees, and the person's own team's; maintainers see all.
 
-        That an anonymous one is among them says nothing of whose it is: `Method.is_named_for` does.
+        Whether it may be named is `Method.is_named_for`.
         """
         if not user.is_authenticated:
             return self.shown()
@@ -78,8 +66,6 @@ class MethodQuerySet(models.QuerySet["Method"]):
 
 
 class Method(models.Model):
-    """A team's named approach."""
-
     id = models.UUIDField(primary_key=True, default=uuid.uuid4, editable=False)
     team = models.ForeignKey(Team, on_delete=models.PROTECT, related_name="methods")
     name = models.CharField(max_length=80)
@@ -139,30 +125,28 @@ class Method(models.Model):
 
     @property
     def pseudonym(self) -> str:
-        """The name of an anonymous method: constant, and from its random id alone."""
+        """Return the constant name of an anonymous method, from its random id alone."""
         return f"Anonymous {self.id.hex[:6]}"
 
     def was_shown(self, *, at: datetime | None = None) -> bool:
-        """Whether everybody sees it, by then already if `at` is given."""
+        """Tell whether everybody sees it, now or as of `at`."""
         if self.visibility == Visibility.PRIVATE:
             return False
         return at is None or (self.shown_at is not None and self.shown_at <= self.known_until(at))
 
     def was_shown_before(self, at: datetime) -> bool:
-        """Whether everybody saw it at that very moment."""
+        """Tell whether everybody saw it at that very moment."""
         return self.was_shown() and self.shown_at is not None and self.shown_at <= at
 
     @property
     def is_masked(self) -> bool:
-        """Whether everybody else sees it under a pseudonym."""
         return self.visibility == Visibility.ANONYMOUS
 
     def known_until(self, at: datetime) -> datetime:
-        """Until when a board as of `at` knows what happened to it."""
         return days.known_until(at, is_masked=self.is_masked)
 
     def is_named_for(self, user: User | AnonymousUser) -> bool:
-        """Whether this reader may know whose it is: it is public, or theirs, or they are a maintainer."""
+        """Tell whether a reader may know the team: it is public, theirs, or they are a maintainer."""
         if self.visibility == Visibility.PUBLIC:
             return True
         if not user.is_authenticated:

@@ -1,4 +1,4 @@
-"""The texts that maintainers write: pages such as rules or privacy, and the announcement of the site."""
+"""Texts of maintainers: pages, and the announcement of the site."""
 
 from typing import Any, Final
 
@@ -11,10 +11,9 @@ ANNOUNCEMENT: Final = "announcement"
 
 
 class PageVersion(models.Model):
-    """A text that a page has, or had. Rows are only added; the highest number is shown.
+    """A version of a page's text; the highest number is shown. Rows are only added.
 
-    Written by `leaderboard.pages.texts`. One row is no page but the line that all pages about splits show
-    until it ends; `leaderboard.editions.policy` writes and deletes it.
+    One row is the site's announcement; `leaderboard.editions.policy` writes and deletes it.
     """
 
     page = models.CharField(max_length=20)
@@ -35,12 +34,11 @@ class PageVersion(models.Model):
 
     @classmethod
     def announcement(cls) -> "models.QuerySet[PageVersion]":
-        """The announcement of the site: one row or none."""
         return cls.objects.filter(page=ANNOUNCEMENT, number=1)
 
     @classmethod
     def announcement_of_every_row(cls) -> dict[str, "models.Subquery[Any]"]:
-        """Annotations with its text and its end, for a query that is made anyway."""
+        """Annotate a query with the announcement's text and end, to save a second query."""
         return {
             "site_line": models.Subquery(cls.announcement().values("text")[:1]),
             "site_line_ends_at": models.Subquery(cls.announcement().values("ends_at")[:1]),

@@ -1,4 +1,4 @@
-"""Who takes part: accounts, teams and the tokens of their CI jobs."""
+"""Accounts, teams and API tokens."""
 
 import uuid
 from typing import Any, ClassVar
@@ -31,17 +31,14 @@ So it is with nearly every provider. Dots stay: with most providers another dot 
 
 
 class UserManager(BaseUserManager["User"]):
-    """Makes accounts that are named by their e-mail address."""
-
     def create_user(self, email: str, password: str | None = None, **fields: Any) -> "User":
-        """An account; without a password it can only be entered by resetting one."""
+        """Make an account; without a password it can only be entered by resetting one."""
         user = self.model(email=self.normalize_email(email).lower(), **fields)
         user.set_password(password)
         user.save(using=self._db)
         return user
 
     def create_superuser(self, email: str, password: str | None = None, **fields: Any) -> "User":
-        """A maintainer's account, which may also look at `/admin/`."""
         return self.create_user(email, password, is_staff=True, is_superuser=True, **fields)
 
 
@@ -76,18 +73,15 @@ class User(AbstractBaseUser, PermissionsMixin):  # type: ignore[django-manager-m
 
     @property
     def is_maintainer(self) -> bool:
-        """Whether this person looks after the benchmark."""
         return self.is_active and self.is_staff
 
     @property
     def acts_as_maintainer(self) -> bool:
-        """Whether this person may do and see here what only maintainers may."""
+        """Tell whether the person may act as a maintainer here (second factor)."""
         return self.is_maintainer and not self.owes_a_code
 
 
 class Team(models.Model):
-    """Who competes. A person alone is a team of one."""
-
     id = models.UUIDField(primary_key=True, default=uuid.uuid4, editable=False)
     name = models.CharField(max_length=80)
     # What the name looks like once confusable characters are folded: no two teams that show it look the same.
@@ -112,7 +106,7 @@ class Team(models.Model):
 
 
 class Membership(models.Model):
-    """That a person belongs to a team. A person belongs to at most one."""
+    """A person's membership; at most one a person."""
 
     # What stands in addresses: the accounts' own numbers would tell how many there are.
     handle = models.UUIDField(default=uuid.uuid4, editable=False, unique=True)
@@ -126,7 +120,7 @@ class Membership(models.Model):
 
 
 class Invitation(models.Model):
-    """A link that lets one person into a team, once, for a while. Kept as its hash; shown once."""
+    """A link that lets one person into a team once. Kept as its hash; shown once."""
 
     id = models.UUIDField(primary_key=True, default=uuid.uuid4, editable=False)
     team = models.ForeignKey(Team, on_delete=models.CASCADE, related_name="invitations")
@@ -146,14 +140,12 @@ class Invitation(models.Model):
 
 
 class Scope(models.TextChoices):
-    """What a token may be used for."""
-
     READ = "read", "read"
     SUBMIT = "submit", "submit"
 
 
 class ApiToken(AbstractAuthToken):
-    """A CI job's key: hashed at rest, shown once, with a name to tell it from its siblings."""
+    """A key for programs: hashed at rest, shown once."""
 
     name = models.CharField(max_length=80)
     may_read = models.BooleanField(default=True)
@@ -183,6 +175,5 @@ class ApiToken(AbstractAuthToken):
 
     @property
     def scopes(self) -> tuple[str, ...]:
-        """What it may be used for, as words."""
         granted = {Scope.READ: self.may_read, Scope.SUBMIT: self.may_submit}
         return tuple(scope.value for scope, is_granted in granted.items() if is_granted)

@@ -1,4 +1,4 @@
-"""How much may be sent: the rules of a split, and of single teams that have others."""
+"""Quotas of splits, and of single teams."""
 
 from datetime import timedelta
 from typing import Final
@@ -23,7 +23,7 @@ EXCESS: Final = {
 
 
 def excess(**counts: int | None) -> dict[str, str]:
-    """By field of `QuotaRules`, what is found and expected of each limit that is too large to be set."""
+    """Return, by field of `QuotaRules`, the problem of each limit that is too large."""
     return {
         name: EXCESS[name] % {"show_value": count}
         for name, count in counts.items()
@@ -32,7 +32,7 @@ def excess(**counts: int | None) -> dict[str, str]:
 
 
 class QuotaRules(models.Model):
-    """Four limits. Each counts submissions of one team to one split."""
+    """Four limits; each counts submissions of one team to one split."""
 
     quota_limit = models.PositiveIntegerField(
         null=True, blank=True, help_text="Submissions within the window. Empty: as many as one likes."
@@ -67,14 +67,13 @@ class QuotaRules(models.Model):
         return f"{self.quota_limit} in {self.quota_window}, {self.quota_min_gap} apart"
 
     def clean(self) -> None:
-        """Raise `ValidationError` for rules that make no sense."""
         super().clean()
         faults = self.faults()
         if faults:
             raise ValidationError(faults)
 
     def faults(self) -> dict[str, str]:
-        """By field, what is found and what is expected of each rule that makes no sense."""
+        """Return the problem of each rule that makes no sense, by field."""
         faults = {}
         for name in ("quota_limit", "quota_rejected_limit"):
             count = getattr(self, name)
@@ -99,7 +98,7 @@ def _is_span(span: timedelta, *, is_none_allowed: bool) -> bool:
 
 
 class QuotaOverride(QuotaRules):
-    """The rules of one team on one split, instead of the split's own. Written by `quotas.usage`."""
+    """The quota of one team on one split, in place of the split's own."""
 
     team = models.ForeignKey(Team, on_delete=models.CASCADE, related_name="quota_overrides")
     split = models.ForeignKey("Split", on_delete=models.CASCADE, related_name="quota_overrides")
@@ -118,7 +117,7 @@ class QuotaOverride(QuotaRules):
 
 
 class SpentMailbox(models.Model):
-    """That a deleted account had a mailbox, which is a keyed hash here; see `quotas.mailboxes`."""
+    """The mailbox of a deleted account, as a keyed hash; see `quotas.mailboxes`."""
 
     account = models.ForeignKey(User, on_delete=models.CASCADE, related_name="+")
     digest = models.CharField(max_length=64, db_index=True)
@@ -134,7 +133,7 @@ class SpentMailbox(models.Model):
 
 
 class Admission(models.Model):
-    """That a team may submit to a split by admission. Written by `leaderboard.quotas.admissions`."""
+    """A team's admission to a split."""
 
     team = models.ForeignKey(Team, on_delete=models.CASCADE, related_name="admissions")
     split = models.ForeignKey("Split", on_delete=models.CASCADE, related_name="admissions")

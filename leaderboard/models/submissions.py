@@ -1,4 +1,4 @@
-"""What was sent, and what it scored."""
+"""Submissions, evaluations and scores."""
 
 import uuid
 from collections.abc import Collection
@@ -20,40 +20,32 @@ MAX_INFRASTRUCTURE_STRIKES = 10
 
 
 class SentFile(NamedTuple):
-    """What a submission's values follow from: the bytes, and the manifest that gives their keys a meaning.
-
-    Both are digests. An anno_id is a number of one manifest, so the same bytes may say something else for
-    another one.
-    """
+    """Digests of a file and its manifest; the same bytes mean something else under another manifest."""
 
     digest: str
     manifest_digest: str
 
 
 class SubmissionQuerySet(models.QuerySet["Submission"]):
-    """Questions about submissions."""
-
     def visible_to(self, user: User | AnonymousUser) -> Self:
-        """The person's own team's submissions; maintainers see all, strangers none."""
+        """Return the team's own submissions; maintainers see all, strangers none."""
         if not user.is_authenticated:
             return self.none()
         return self if user.acts_as_maintainer else self.of(user)
 
     def of(self, user: User) -> Self:
-        """The person's own team's submissions, without those to splits that are switched off."""
+        """Return the team's own submissions, without those to splits that are switched off."""
         return self.filter(method__team__memberships__user=user, split__in=Split.objects.shown())
 
     def active(self) -> Self:
-        """Submissions that their team has not withdrawn."""
+        """Return submissions that are not withdrawn."""
         return self.filter(withdrawn_at=None)
 
 
 class Submission(models.Model):
-    """One file for one split, kept for ever as the bytes that came in."""
+    """One file for one split, kept as the bytes that came in."""
 
     class Via(models.TextChoices):
-        """The door it came through."""
-
         WEB = "WEB", "web"
         API = "API", "API"
 
@@ -97,7 +89,6 @@ class Submission(models.Model):
 
     @property
     def sent_file(self) -> SentFile:
-        """What its values follow from."""
         return SentFile(self.digest, self.manifest_digest)
 
 
@@ -116,17 +107,15 @@ FINAL_STATUSES = (Status.SCORED, Status.REJECTED, Status.SYSTEM_ERROR, Status.CA
 
 
 class EvaluationQuerySet(models.QuerySet["Evaluation"]):
-    """Questions about evaluations."""
-
     def due(self) -> Self:
-        """What waits and may be begun, in the order in which workers take it."""
+        """Return what waits and may begin, in order."""
         return self.filter(status=Status.QUEUED, due_at__lte=Now()).in_turn()
 
     def in_turn(self) -> Self:
-        """In the order in which workers take them: last what has stopped its reader before.
+        """Order as workers take them; last what has stopped its reader before.
 
-        Of files that are equally urgent, those of teams and people none of whose files is being read go
-        first, then the oldest. So one team cannot keep all readers while others wait.
+        Among equally urgent files, those of teams and people without a file being read come first, so one
+        team cannot occupy all readers.
         """
         running = Evaluation.objects.filter(status=Status.RUNNING, priority=Evaluation.PRIORITY_LIVE)
         # Asked beside and not joined, so that whoever locks what waits locks nothing else.
@@ -138,7 +127,7 @@ class EvaluationQuerySet(models.QuerySet["Evaluation"]):
         return self.order_by("n_poison_strikes", "priority", Exists(of_the_same), "queued_at")
 
     def suspect(self) -> Self:
-        """Evaluations that failed without a failure of machines: their file may be the cause."""
+        """Return evaluations that failed without a failure of machines: their file may be the cause."""
         return self.filter(
             status=Status.SYSTEM_ERROR,
             n_poison_strikes__gt=0,
@@ -146,13 +135,13 @@ class EvaluationQuerySet(models.QuerySet["Evaluation"]):
         )
 
     def scorable(self, readable_truths: Collection[str]) -> Self:
-        """Evaluations against a ground truth whose digest is among these."""
+        """Return evaluations whose ground truth has one of these digests."""
         # A subquery and no join, so that no edition is locked with it.
         return self.filter(edition__in=Edition.objects.filter(ground_truth__in=readable_truths))
 
 
 class Evaluation(models.Model):
-    """One submission scored in one edition: the unit of work, and the only status of the system."""
+    """A submission scored in one edition: the unit of work, and the only thing with a status."""
 
     objects: ClassVar[EvaluationQuerySet] = EvaluationQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
 
@@ -224,7 +213,7 @@ class Evaluation(models.Model):
 
     @property
     def kept_in(self) -> int | None:
-        """The number of the last published edition that scored what this one rejects; None if none did."""
+        """Return the number of the last published edition that scored what this one rejects."""
         if self.status != Status.REJECTED:
             return None
         rivals = [row for row in self.submission.evaluations.all() if row.status == Status.SCORED]
@@ -232,7 +221,7 @@ class Evaluation(models.Model):
 
     @property
     def is_file_suspect(self) -> bool:
-        """Whether it came to nothing, and not because machines failed: its file may be the cause."""
+        """Tell whether it failed without a failure of machines: its file may be the cause."""
         return (
             self.status == Status.SYSTEM_ERROR
             and self.n_poison_strikes > 0
@@ -241,12 +230,11 @@ class Evaluation(models.Model):
 
     @property
     def is_final(self) -> bool:
-        """Whether nothing will change any more."""
         return self.status in FINAL_STATUSES
 
 
 class Score(models.Model):
-    """One published value: evaluation × metric × TTC range, rounded as the protocol says."""
+    """A published value: evaluation × metric × TTC range, rounded as the protocol says."""
 
     evaluation = models.ForeignKey(Evaluation, on_delete=models.CASCADE, related_name="scores")
     metric = models.CharField(max_length=32)

@@ -1,12 +1,10 @@
-"""When the queue was last looked after."""
+"""The time of the last sweep, by the database's clock."""
 
 from django.db import models
 from django.db.models import Q
 
 
 class SweepBeat(models.Model):
-    """The one row that says when the last sweep was finished, by the database's clock."""
-
     THE_ONE = 1
 
     id = models.PositiveSmallIntegerField(primary_key=True, default=THE_ONE, editable=False)

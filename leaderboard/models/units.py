@@ -1,4 +1,4 @@
-"""What an edition takes as independent."""
+"""The unit of an edition's confidence intervals, tests and rank ranges."""
 
 from typing import Any
 
@@ -8,8 +8,6 @@ from evaluator.units import DAY, GIVEN, KINDS, RECORDING, in_words, noun_of
 
 
 class UnitOfInference(models.Model):
-    """The unit of an edition's intervals, tests and rank ranges, which it keeps; from before: recordings."""
-
     unit = models.CharField(
         max_length=12,
         choices=[(kind, kind) for kind in KINDS],
@@ -33,15 +31,12 @@ class UnitOfInference(models.Model):
 
     @property
     def unit_count(self) -> int:
-        """How many units it has."""
         return int(self.ground_truth.n_recordings if self.n_units is None else self.n_units)
 
     @property
     def unit_noun(self) -> str:
-        """What one of them is called."""
         return noun_of(self.unit)
 
     @property
     def units(self) -> str:
-        """Its units in words, as "42 days"."""
         return in_words(self.unit, self.unit_count)

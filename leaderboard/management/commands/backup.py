@@ -12,16 +12,12 @@ from leaderboard.backups import backup, contents
 
 
 class Command(BaseCommand):
-    """Writes database, files, ground truth and the public halves of keys into a folder."""
-
     help = "Back up the whole site into a folder, while it runs; again into the same one: only what is new."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Where to."""
         parser.add_argument("dir", metavar="DIR", help="an empty folder, or one that has an earlier backup")
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Make it, and say what it holds and what is missing."""
         try:
             made = backup.make(into=options["dir"], now=timezone.now())
         except (contents.NoBackup, OSError, DatabaseProblem) as fault:

@@ -19,17 +19,14 @@ _EPOCH_S: Final = "315532800"
 
 
 class Command(BaseCommand):
-    """Builds the wheel of evaluator and baselines from this checkout, without asking any index."""
-
     help = "Build the wheel of the evaluator that visitors install from /dist/."
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Build it, and say where it is."""
         self.stdout.write(f"Built {build().name}; the site serves it at /dist/.")
 
 
 def build() -> Path:
-    """Build the wheel into `settings.DIST_DIR`. Raises `CommandError` with what setuptools says."""
+    """Build the wheel into `settings.DIST_DIR`. Raises `CommandError` with the output of setuptools."""
     root, out = Path(settings.BASE_DIR), Path(settings.DIST_DIR)
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as directory:
@@ -59,7 +56,6 @@ def build() -> Path:
 
 
 def is_built() -> bool:
-    """Whether there is a wheel that is as new as the sources."""
     built_s = max((path.stat().st_mtime for path in Path(settings.DIST_DIR).glob("tsttc-*.whl")), default=0.0)
     root = Path(settings.BASE_DIR)
     sources = [root / "pyproject.toml", *(path for name in PACKAGES for path in (root / name).rglob("*.py"))]

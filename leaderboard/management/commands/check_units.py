@@ -13,17 +13,13 @@ from leaderboard.statistics import unit_checks
 
 
 class Command(RefusingCommand):
-    """Says whether recordings of one day are alike."""
-
     help = "Say how alike recordings of one day are in an edition, and by how much that widens its intervals."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """SPLIT and NUMBER."""
         parser.add_argument("split")
         parser.add_argument("number", type=int)
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Print a line for each of the first methods, and for its difference from the best."""
         edition = Edition.objects.filter(split=options["split"], number=options["number"]).first()
         if edition is None:
             raise CommandError(f"There is no edition {options['number']} of {options['split']!r}.")

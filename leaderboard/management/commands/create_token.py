@@ -16,12 +16,9 @@ from leaderboard.people import tokens
 
 
 class Command(RefusingCommand):
-    """Makes an API token."""
-
     help = "Create an API token and print it once. An address without an account gets one without a password."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """EMAIL, the token's name, and its limits."""
         parser.add_argument("email")
         parser.add_argument("--name", required=True, help="name of the token, such as 'nightly CI'")
         parser.add_argument(
@@ -39,7 +36,6 @@ class Command(RefusingCommand):
         )
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """The token on standard output, everything else on standard error."""
         email = options["email"].strip().lower()
         try:
             validate_email(email)

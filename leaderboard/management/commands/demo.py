@@ -26,17 +26,13 @@ ANYWHERE = frozenset({"", "0.0.0.0", "::"})  # noqa: S104 - nothing is bound her
 
 
 class Command(BaseCommand):
-    """Serves the leaderboard with simulated data."""
-
     help = "Migrate, seed, and run web server and worker until Ctrl-C."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Where to listen."""
         parser.add_argument("--host", default="127.0.0.1")
         parser.add_argument("--port", type=int, default=8000)
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Prepare what is not there yet, then serve."""
         host, port = options["host"], options["port"]
         if settings.PRODUCTION:
             raise CommandError("The demo is for the embedded profile; TSTTC_PROFILE says production.")
@@ -70,13 +66,12 @@ class Command(BaseCommand):
             raise CommandError(str(fault)) from fault
 
     def _say(self, text: str) -> None:
-        """Print it at once, also where the output is not a terminal."""
         self.stdout.write(text, ending="")
         self.stdout.flush()
 
 
 def static_files_changed(root: Path) -> bool:
-    """Whether any static file is newer than what was collected from them."""
+    """Tell whether a static file is newer than the collected ones."""
     collected = root / "staticfiles.json"
     if not collected.exists():
         return True
@@ -89,10 +84,7 @@ def static_files_changed(root: Path) -> bool:
 
 
 def names_of(host: str) -> list[str]:
-    """The names by which browsers may ask: a page elsewhere that leads its own name here is refused.
-
-    Whoever listens at every address is asked by names that only they know.
-    """
+    """Return the host names that browsers may use: a foreign page could point its own name here."""
     if host in ANYWHERE:
         return ["*"]
     return ["localhost", "127.0.0.1", "[::1]", f"[{host}]" if ":" in host else host]

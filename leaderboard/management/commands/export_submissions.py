@@ -14,18 +14,14 @@ from leaderboard.storage import files
 
 
 class Command(BaseCommand):
-    """Writes every submission with its published numbers into a table."""
-
     help = "Write all submissions with all numbers into FILE.csv, or FILE.parquet (needs pyarrow)."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Where to, and of what."""
         parser.add_argument("file", metavar="FILE", type=Path)
         parser.add_argument("--split", default="", help="only this one")
         parser.add_argument("--addresses", action="store_true", help="e-mail addresses instead of numbers")
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Write it, whole or not at all, readable by its owner only."""
         path: Path = options["file"]
         if options["split"] and not Split.objects.filter(pk=options["split"]).exists():
             raise CommandError(f"There is no split {options['split']!r}.")

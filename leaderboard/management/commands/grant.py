@@ -1,8 +1,6 @@
 """`manage.py grant`: let the application's own role work on PostgreSQL, after each `migrate`.
 
-The role owns nothing. It reads and writes every table but two: of the audit log it reads, adds and seals
-rows, of the applied migrations it reads. So a fault in a web process or a worker cannot take the trail's
-triggers off.
+It owns nothing and cannot change the audit log, so a fault in a process cannot remove the triggers.
 """
 
 from typing import Any, Final
@@ -26,12 +24,9 @@ _MAY: Final = "SELECT, INSERT, UPDATE, DELETE"
 
 
 class Command(BaseCommand):
-    """Makes the role if it is not there, and gives it what it needs and nothing more."""
-
     help = "Grant TSTTC_APPLICATION_ROLE what the application needs; run as the owner, after migrate."
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Grant, or say that no role is set."""
         role = settings.APPLICATION_ROLE
         if not role:
             self.stdout.write("TSTTC_APPLICATION_ROLE is not set: the application works as the owner.")
@@ -45,7 +40,7 @@ class Command(BaseCommand):
 
 
 def make_role(role: str, *, password: str) -> None:
-    """Make the role that signs in with this password, or give it this one."""
+    """Make the role, or set its password."""
     if not password:
         raise CommandError("TSTTC_APPLICATION_PASSWORD is not set; expected the password of the role.")
     with connection.cursor() as cursor:
@@ -73,7 +68,7 @@ def make_role(role: str, *, password: str) -> None:
 
 
 def grant_to(role: str) -> None:
-    """Give the role what the application needs on every table that there is now."""
+    """Grant the rights that the application needs on every table."""
     own = sql.Identifier(role)
     with connection.cursor() as cursor:
         tables = connection.introspection.table_names(cursor)

@@ -12,18 +12,14 @@ from leaderboard.management.arguments import RefusingCommand
 
 
 class Command(RefusingCommand):
-    """Opens a split with its ground truth."""
-
     help = "Validate a ground truth (CSV, or the toolkit's annotation folder), keep it, and open an edition."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """SPLIT, PATH and the protocol."""
         parser.add_argument("split", help="val, test or demo")
         parser.add_argument("path", type=Path, help="a CSV file or a folder of annotation files")
         parser.add_argument("--protocol", default="tsttc-1", choices=["tsttc-1", "toolkit"])
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Import, and print the edition."""
         edition = ground_truth.import_truth(
             split_name=options["split"],
             path=options["path"],

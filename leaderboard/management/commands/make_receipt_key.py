@@ -9,14 +9,11 @@ from evaluator import receipts
 
 
 class Command(BaseCommand):
-    """Makes a key for score receipts."""
-
     help = "Make a key that signs score receipts, and print it with its public half. Nothing is stored."
     # Also where the settings lack the key that this makes.
     requires_system_checks: list[str] = []
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """The variable on standard output, everything else on standard error."""
         private_key = secrets.token_bytes(receipts.KEY_BYTES)
         public_key = receipts.public_key(private_key)
         self.stdout.write(f"TSTTC_RECEIPT_KEY={receipts.encode(private_key)}")

@@ -8,15 +8,12 @@ from leaderboard.storage import seeds
 
 
 class Command(BaseCommand):
-    """Makes the secret that random numbers of hidden splits come from, if there is none."""
-
     help = (
         "Make the secret that the random weights and signs of hidden splits come from, beside the ground "
         "truth, if there is none. import_truth and open_edition --truth make it as well."
     )
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Make it, and say where it is."""
         was_there = seeds.path().exists()
         seeds.ensure()
         self.stdout.write(f"{seeds.path()} {'was there already' if was_there else 'is made'}.")

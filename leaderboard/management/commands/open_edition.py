@@ -21,15 +21,12 @@ from leaderboard.storage import files
 
 
 class Command(RefusingCommand):
-    """Opens an edition next to the published one."""
-
     help = (
         "Open an edition with corrected ground truth and re-score all submissions that are not withdrawn. "
         "Nothing public changes; after an interruption run the command again."
     )
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """SPLIT, what is new, and whether to wait."""
         parser.add_argument("split")
         parser.add_argument("--truth", type=Path, required=True, help="CSV file or annotation folder")
         parser.add_argument("--protocol", choices=sorted(PROTOCOLS), help="default: unchanged")
@@ -45,7 +42,6 @@ class Command(RefusingCommand):
         parser.add_argument("--wait", action="store_true", help="show progress until all are decided")
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Open, and follow the progress if asked."""
         if options["dry_run"] or options["diff"]:
             self._look(options)
             return
@@ -77,7 +73,6 @@ class Command(RefusingCommand):
         )
 
     def _look(self, options: dict[str, Any]) -> None:
-        """Say what the labels of a file would change, and write it down by recording if asked."""
         if not options["dry_run"]:
             raise CommandError("--diff needs --dry-run.")
         changes = label_changes.look(split_name=options["split"], path=options["truth"])
@@ -102,7 +97,7 @@ class Command(RefusingCommand):
                 raise CommandError(f"{options['diff']} cannot be written: {fault.strerror}") from fault
 
     def _follow(self, edition: Edition) -> None:
-        """One line that renews itself on a terminal, one line a change elsewhere."""
+        # One line that renews itself on a terminal, one line a change elsewhere.
         last = ""
         while (progress := corrections.progress(edition)).n_waiting:
             text = line(progress)
@@ -114,7 +109,7 @@ class Command(RefusingCommand):
 
 
 def counts(change: history.TruthChange | None) -> str:
-    """By how much one ground truth differs from another, in words."""
+    """Word the differences between two ground truths."""
     if change is None:
         return "different ground truth, not compared yet"
     added = counted(change.n_added, "sequence")
@@ -125,7 +120,6 @@ def counts(change: history.TruthChange | None) -> str:
 
 
 def line(progress: corrections.RescoringProgress) -> str:
-    """The progress in one line."""
     rate = f", {progress.rate_per_s:.1f}/s" if progress.rate_per_s else ""
     left = f", {progress.left_s:.0f} s left" if progress.left_s is not None else ""
     return (

@@ -18,12 +18,9 @@ _MAIL = (
 
 
 class Command(AccountCommand):
-    """Takes the second factor off an account."""
-
     help = "Remove the second factor of an account whose owner lost it, with its recovery codes."
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Reset, and tell the person by mail."""
         user = account_of(options)
         event = second_factor.reset(user=user, reason=options["reason"])
         text = _MAIL.format(contact=settings.CONTACT_EMAIL, site=settings.SITE_URL, name=settings.SITE_NAME)

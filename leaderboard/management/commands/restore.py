@@ -12,18 +12,14 @@ from leaderboard.backups.restore import restore
 
 
 class Command(BaseCommand):
-    """Puts a backup into a new database, an empty file store and an empty ground-truth directory."""
-
     help = "Restore a backup into a fresh place, as the owner of the tables, and verify every digest."
     # The database may have no table yet.
     requires_migrations_checks = False
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Where from."""
         parser.add_argument("dir", metavar="DIR", help="a folder that `manage.py backup` wrote")
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Restore it, and say what was verified and what is left to do."""
         try:
             done = restore(source=options["dir"])
         except (contents.NoBackup, OSError, DatabaseProblem) as fault:

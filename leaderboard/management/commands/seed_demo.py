@@ -11,12 +11,9 @@ from leaderboard.management.arguments import RefusingCommand
 
 
 class Command(RefusingCommand):
-    """Fills the split `demo`."""
-
     help = "Give the split 'demo' simulated ground truth and submissions; existing data stays."
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Seed, and say how to sign in."""
         if settings.PRODUCTION:
             raise CommandError("The demo creates an account and prints its password; not for production.")
         password = seed.seed(now=timezone.now(), password_path=settings.DATA_DIR / "demo-password")

@@ -14,18 +14,14 @@ from leaderboard.mails import notices, outbox
 
 
 class Command(BaseCommand):
-    """Sends what waits in the outbox, where workers cannot: they may have no way out."""
-
     help = "Send the mails that wait: once, or with --every S again and again until the process is ended."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """How often."""
         parser.add_argument(
             "--every", metavar="S", type=float, default=0.0, help="seconds between two rounds"
         )
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Do it once, and say so; or until SIGTERM."""
         if not options["every"]:
             self._once()
             self.stdout.write(f"{outbox.waiting():,} mails still wait.")

@@ -8,17 +8,13 @@ from leaderboard.people import accounts
 
 
 class Command(AccountCommand):
-    """Makes an account that exists a maintainer's, or ends the role."""
-
     help = "Make the owner of an account a maintainer, or end the role with --end."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """EMAIL, reason, end."""
         super().add_arguments(parser)
         parser.add_argument("--end", action="store_true", help="end the role")
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Change the role, and say what it is now."""
         user = accounts.set_maintainer(
             user=account_of(options), is_maintainer=not options["end"], reason=options["reason"]
         )

@@ -9,12 +9,9 @@ from leaderboard import audit
 
 
 class Command(BaseCommand):
-    """Goes through the audit log."""
-
     help = "Check that no audit event was changed, removed or inserted. Store the printed hash elsewhere."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """The hash noted last time."""
         parser.add_argument(
             "--expect",
             metavar="HASH",
@@ -23,7 +20,6 @@ class Command(BaseCommand):
         )
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """One line on standard output, or where the chain breaks and exit code 1."""
         verification = audit.verify(expected_hash=options["expect"])
         if verification.breaks:
             lines = "\n".join(
