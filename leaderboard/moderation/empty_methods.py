@@ -1,4 +1,4 @@
-"""Deletion of a method without any score. Its submissions are withdrawn; its name is free."""
+"""Deletion of a method without any score; it withdraws the submissions and frees the name."""
 
 from datetime import datetime
 
@@ -13,7 +13,7 @@ from leaderboard.submissions import intake
 
 
 def can_be_deleted(method: Method) -> bool:
-    """Whether only its team has seen the method, and nothing of it was or can be scored."""
+    """Tell whether only its team has seen the method, and nothing of it was or can be scored."""
     if method.visibility != Visibility.PRIVATE or method.deleted_at is not None:
         return False
     others = Evaluation.objects.exclude(status__in=[Status.REJECTED, Status.CANCELLED])

@@ -32,7 +32,7 @@ NOWHERE = "forgotten.invalid"
 
 
 def export(*, user: User) -> dict[str, Any]:
-    """All that is kept about a person, as plain values: no secret, and nothing about anybody else."""
+    """Return all that is kept about a person as plain values, without secrets or other people."""
     team = Team.objects.filter(memberships__user=user).first()
     sent = Submission.objects.filter(submitted_by=user).select_related("method").order_by("submitted_at")
     # A team that they have left may call a method something else by now, which is not theirs to know.
@@ -98,10 +98,10 @@ def export(*, user: User) -> dict[str, Any]:
 
 
 def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> None:
-    """Delete everything that names a person, for good. `actor` is the person, a maintainer, or None.
+    """Delete everything that names a person. `actor` is the person, a maintainer, or None.
 
-    The member who joined first owns the team then; a team without other members loses its name. Raises
-    `NotMaintainer`, and `Refused` for a maintainer.
+    The oldest member owns the team then; a team without other members loses its name.
+    Raises `NotMaintainer`, and `Refused` for a maintainer.
     """
     if actor is None or actor.pk != user.pk:
         require_maintainer(actor, to="delete accounts of others")
@@ -141,7 +141,7 @@ def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> Non
 
 
 def delete_late_rows() -> None:
-    """Delete what requests wrote into the tables of allauth while their account was being deleted."""
+    # Requests may write into the tables of allauth while their account is being deleted.
     for model in (EmailAddress, Authenticator, SocialAccount):
         model.objects.filter(user__is_active=False, user__email__endswith=f"@{NOWHERE}").delete()
 

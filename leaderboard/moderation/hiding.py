@@ -1,4 +1,4 @@
-"""Moderation: what maintainers do to names, entries and accounts of others, each with a reason."""
+"""Moderation of names, entries and accounts by maintainers, each with a reason."""
 
 from datetime import datetime
 from uuid import UUID
@@ -18,7 +18,7 @@ MAX_REASON = 500
 
 
 def rename_team(*, team: Team, name: str, reason: str, actor: User | None, now: datetime) -> Team:
-    """Call a team something else at once; without a name, something that says nothing. Raises `Refused`."""
+    """Rename a team at once; without a name, neutrally. Raises `Refused`."""
     require_maintainer(actor, to="rename teams")
     reason = _reason(reason)
     with transaction.atomic():
@@ -39,7 +39,7 @@ def rename_team(*, team: Team, name: str, reason: str, actor: User | None, now: 
 
 
 def rename_method(*, method: Method, name: str, reason: str, actor: User | None, now: datetime) -> Method:
-    """Call a method something else, also a public one. Raises `Refused`."""
+    """Rename a method, also a public one. Raises `Refused`."""
     require_maintainer(actor, to="rename methods of others")
     reason = _reason(reason)
     with transaction.atomic():
@@ -74,7 +74,7 @@ def clear_texts(*, method: Method, reason: str, actor: User | None) -> Method:
 
 
 def move_method(*, method: Method, to: Team, reason: str, actor: User | None) -> Method:
-    """Let another team have a method and its submissions. Raises `Refused`."""
+    """Move a method and its submissions to another team. Raises `Refused`."""
     require_maintainer(actor, to="move methods between teams")
     reason = _reason(reason)
     with transaction.atomic():
@@ -102,9 +102,9 @@ def move_method(*, method: Method, to: Team, reason: str, actor: User | None) ->
 def withdraw_entry(
     *, submission: Submission, reason: str, actor: User | None, now: datetime, is_hidden: bool
 ) -> Submission:
-    """Take the values of a submission off the boards; with `is_hidden` its row as well, at all times.
+    """Take a submission's values off the boards; with `is_hidden` its row as well, on boards of the past too.
 
-    A hidden one is on no board any more, also not on boards as of earlier times. Raises `Refused`.
+    Raises `Refused`.
     """
     require_maintainer(actor, to="withdraw submissions of others")
     reason = _reason(reason)
@@ -149,16 +149,11 @@ def set_active(*, user: User, is_active: bool, reason: str, actor: User | None) 
 
 
 def masked(noun: str, pk: UUID) -> str:
-    """A name that says nothing.
-
-    >>> masked("Team", UUID(int=0x3F9C2A << 104))
-    'Team 3f9c2a'
-    """
+    """Return a neutral name, as "Team 3f9c2a"."""
     return f"{noun} {pk.hex[:6]}"
 
 
 def _locked_teams(*wanted: Team) -> list[Team]:
-    """These teams, locked. Raises `Refused` where one has ended."""
     locked = teams.locked(*wanted)
     if len(locked) < len({team.pk for team in wanted}):
         raise Refused(
@@ -169,7 +164,6 @@ def _locked_teams(*wanted: Team) -> list[Team]:
 
 
 def _locked(method: Method) -> Method:
-    """The method with its team, both locked."""
     teams.locked(method.team)
     rows = Method.objects.select_for_update(of=("self",), no_key=True).select_related("team")
     return rows.get(pk=method.pk)

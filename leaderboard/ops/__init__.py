@@ -1,4 +1,1 @@
-"""Operations: health, Prometheus, logging, rate limits, the broker.
-
-Every room may import this one.
-"""
+"""Operations: health, Prometheus, logging, rate limits, the broker."""

@@ -1,4 +1,4 @@
-"""The broker: makes things fast, and may be absent. A message is only the news that something waits."""
+"""The broker, which may be absent: a message only says that something waits."""
 
 import time
 from functools import lru_cache
@@ -31,11 +31,9 @@ class CircuitBreaker:
         self._until_s = 0.0
 
     def begin(self) -> None:
-        """Note that it has just failed."""
         self._until_s = time.monotonic() + self._rest_s
 
     def __bool__(self) -> bool:
-        """Whether the broker is to be skipped now."""
         return time.monotonic() < self._until_s
 
 
@@ -48,7 +46,7 @@ def nudge() -> bool:
 
 
 def work_off() -> bool:
-    """Tell the workers that something waits behind submissions; False if the broker did not take it."""
+    """Tell the workers of low-priority work; False if the broker did not take it."""
     return _sent("work_off")
 
 
@@ -68,10 +66,7 @@ def _sent(task: str) -> bool:
 
 @lru_cache(maxsize=1)
 def _connections() -> Any:
-    """This process's connections to the broker: not Celery's own, which wait much longer.
-
-    None where there is no broker (`memory://`): no other process would hear a message.
-    """
+    # Not Celery's own connections, which wait much longer; none for `memory://`: no other process reads it.
     if settings.CELERY_BROKER_URL == "memory://":
         return None
     connection: Connection = current_app.connection_for_write(transport_options=FAIL_FAST)

@@ -1,7 +1,4 @@
-"""What `check --deploy` sees of a production: its variables, and the services that they name.
-
-Each finding is one sentence; all of them come at once. None has an address or a password in it.
-"""
+"""Checks of `check --deploy`: variables, and the services that they name, without addresses or passwords."""
 
 import os
 from collections.abc import Iterator
@@ -20,7 +17,7 @@ _BROKERS: Final = ("redis://", "rediss://", "redis+socket://", "amqp://", "amqps
 
 
 def check_variables(app_configs: object = None, **kwargs: Any) -> list[CheckMessage]:
-    """What is wrong with the variables, as far as they can be read."""
+    """Report faults of the variables."""
     messages: list[CheckMessage] = [
         Caution(sentence, id="leaderboard.W002") for sentence in environment.misspelt(os.environ)
     ]
@@ -36,7 +33,7 @@ def check_variables(app_configs: object = None, **kwargs: Any) -> list[CheckMess
 
 
 def check_services(app_configs: object = None, **kwargs: Any) -> list[CheckMessage]:
-    """The services that a production needs and that do not answer; each is given some seconds."""
+    """Report the services that do not answer within some seconds."""
     if not environment.PRODUCTION:
         return []
     faults = []
@@ -67,7 +64,7 @@ def _addresses() -> Iterator[str]:
 
 
 def _can_be_written(folder: str) -> bool:
-    """Whether files can be made in a folder, or the folder in the first one above it that is there."""
+    # Of a folder that is not there, the first existing one above it counts.
     while folder and not os.path.exists(folder):  # noqa: PTH110 - a name that may be of nothing
         folder = os.path.dirname(folder)  # noqa: PTH120 - the same
     return os.path.isdir(folder) and os.access(folder, os.W_OK)  # noqa: PTH112 - the same

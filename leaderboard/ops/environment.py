@@ -1,4 +1,4 @@
-"""What the settings read from the environment, and the private folder and keys of a checkout.
+"""Settings from the environment, and the private folder and keys of a checkout.
 
 Imported by `leaderboard/settings.py` alone, before Django is configured.
 """
@@ -41,7 +41,6 @@ class Environment(environ.Env):
     """The variables. An empty one counts as absent; a malformed one is in `FAULTS` and has its default."""
 
     def get_value(self, var: str, cast: Any = None, default: Any = environ.Env.NOTSET, **options: Any) -> Any:
-        """The value of a variable, or the default."""
         ASKED.add(var)
         if not os.environ.get(var):
             return default
@@ -55,17 +54,17 @@ class Environment(environ.Env):
 
 
 def database(text: str) -> dict[str, Any]:
-    """Django's settings of a database from its URL."""
+    """Return Django's settings of a database from its URL."""
     return _parsed("TSTTC_DATABASE_URL", text, env.db_url_config, "postgres://user:password@host:5432/name")
 
 
 def mail_server(text: str) -> dict[str, Any]:
-    """Django's settings of a mail server from its URL."""
+    """Return Django's settings of a mail server from its URL."""
     return _parsed("TSTTC_EMAIL_URL", text, env.email_url_config, "smtp+tls://user:password@host:587")
 
 
 def networks(name: str, *, default: list[str]) -> list[IPv4Network | IPv6Network]:
-    """The networks that a variable lists."""
+    """Parse the networks of a variable."""
     parsed = []
     for text in env.list(name, default=default):
         try:
@@ -76,7 +75,7 @@ def networks(name: str, *, default: list[str]) -> list[IPv4Network | IPv6Network
 
 
 def providers(**known: tuple[str, str, str]) -> dict[str, dict[str, Any]]:
-    """allauth's settings of the providers whose client is set; each has a name and two variables."""
+    """Return allauth's settings of the providers whose client is set."""
     configured = {}
     for provider, (name, id_variable, secret_variable) in known.items():
         client_id, secret = (env.str(variable, default="") for variable in (id_variable, secret_variable))
@@ -106,7 +105,7 @@ def _parsed(name: str, text: str, parse: Callable[[str], dict[str, Any]], exampl
 
 
 def misspelt(names: Iterable[str]) -> list[str]:
-    """A sentence for each `TSTTC_…` among these that is never read, with the name that may be meant."""
+    """Return a sentence for each `TSTTC_…` that is never read, with a similar name."""
     known = ASKED | {_PREFIX + name for name in _OF_OTHERS}
     sentences = []
     for name in sorted(names):
@@ -117,10 +116,7 @@ def misspelt(names: Iterable[str]) -> list[str]:
 
 
 def require_sound() -> None:
-    """Say everything that is wrong with the variables. Raises `ImproperlyConfigured`.
-
-    Names that are never read are no fault, but may explain why a variable is not set.
-    """
+    """Report every fault of the variables, and names that are never read. Raises `ImproperlyConfigured`."""
     if FAULTS:
         # Django may read the settings twice; each fault is said once.
         raise ImproperlyConfigured("\n".join([*dict.fromkeys(FAULTS), *misspelt(os.environ)]))
@@ -141,9 +137,9 @@ if PROCESS not in PROCESSES:
 
 
 def required(name: str, *, embedded: Any, by: Collection[str] = PROCESSES, elsewhere: Any = "") -> Any:
-    """The variable's text; in production its absence is an error, elsewhere the default is `embedded`.
+    """Return the variable; it is required in the processes `by` of production.
 
-    `by` are the processes of production that need it; in the others the default is `elsewhere`.
+    Their default is an error, that of other processes `elsewhere`, outside production `embedded`.
     """
     if not PRODUCTION:
         return env.str(name, default=embedded)
@@ -153,10 +149,7 @@ def required(name: str, *, embedded: Any, by: Collection[str] = PROCESSES, elsew
 
 
 def make_private(folder: Path) -> None:
-    """Make a folder that its owner alone can read; close an existing one to all others.
-
-    A folder of somebody else, or one that many share (such as /tmp), stays as it is.
-    """
+    """Make a folder private to its owner; leave one of another user, or a shared one such as /tmp."""
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     status = folder.stat()
     is_shared = status.st_uid != os.geteuid() or status.st_mode & stat.S_ISVTX
@@ -165,9 +158,9 @@ def make_private(folder: Path) -> None:
 
 
 def key_of_checkout(path: Path, make: Callable[[], str]) -> str:
-    """A key of this checkout's own, made once, so that what it signed survives a restart of the demo.
+    """Return a key of this checkout, made once, so that a restart of the demo keeps signatures.
 
-    In production, where only the web process is given keys, it is one that nobody else ever has.
+    In production, where only the web process is given keys, it is random.
     """
     if PRODUCTION:
         return make()

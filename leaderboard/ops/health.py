@@ -1,7 +1,4 @@
-"""Whether this installation can do its work: database and broker answer, the queue is looked after.
-
-The checks are for a probe that asks every few seconds: each is bounded in time, and none raises.
-"""
+"""Health: database and broker answer, sweeps run. Each check is bounded in time, and none raises."""
 
 import time
 from collections.abc import Iterator
@@ -33,7 +30,7 @@ PROBE = "probe"
 
 @dataclass(frozen=True)
 class Check:
-    """What one check found. `detail` names no host and no account: strangers may read it."""
+    """The result of a check. `detail` names no host and no account: strangers may read it."""
 
     name: str
     is_ok: bool
@@ -42,7 +39,7 @@ class Check:
 
 
 def record_sweep(*, n_out_of_reach: int = 0) -> None:
-    """Write down that a sweep was finished just now, and what its worker cannot do."""
+    """Save the time of a sweep, and how much its worker could not read."""
     SweepBeat.objects.bulk_create(
         [SweepBeat(id=SweepBeat.THE_ONE, swept_at=Now(), n_out_of_reach=n_out_of_reach)],
         update_conflicts=True,
@@ -52,7 +49,7 @@ def record_sweep(*, n_out_of_reach: int = 0) -> None:
 
 
 def sweep_age_s(*, using: str = "default") -> float | None:
-    """Seconds since the last sweep, by the database's clock; None if there was none."""
+    """Return the seconds since the last sweep, by the database's clock."""
     age: timedelta | None = (
         SweepBeat.objects.using(using)
         .annotate(age=Now() - F("swept_at"))
@@ -63,12 +60,12 @@ def sweep_age_s(*, using: str = "default") -> float | None:
 
 
 def checks() -> tuple[Check, ...]:
-    """Ask database, sweep and broker. Takes at most about three times `CHECK_TIMEOUT_S`; never raises."""
+    """Check database, sweep and broker, within about three times `CHECK_TIMEOUT_S`."""
     return (*_database(), broker())
 
 
 def database() -> Check:
-    """Whether a new connection to the database answers."""
+    """Check a new connection to the database."""
     started_s = time.monotonic()
     try:
         with _own_connection() as alias, connections[alias].cursor() as cursor:
@@ -80,12 +77,11 @@ def database() -> Check:
 
 
 def n_out_of_reach(*, using: str = "default") -> int:
-    """What waited, at the last sweep, for a ground truth that the sweeping worker cannot read."""
+    """Return how much waited, at the last sweep, for a ground truth that its worker cannot read."""
     return SweepBeat.objects.using(using).values_list("n_out_of_reach", flat=True).first() or 0
 
 
 def _database() -> tuple[Check, ...]:
-    """A new connection and what the last sweep wrote down: how old it is, and what it found out of reach."""
     started_s = time.monotonic()
     try:
         with _own_connection() as alias:
@@ -110,7 +106,7 @@ def _database() -> tuple[Check, ...]:
 
 
 def _ground_truth(n_without: int) -> Check:
-    """Whether the workers can read the ground truth of what waits. It does not say how much waits."""
+    # It does not say how much waits: strangers may read it.
     detail = (
         "a worker cannot read the ground truth of an evaluation that waits"
         if n_without
@@ -120,7 +116,7 @@ def _ground_truth(n_without: int) -> Check:
 
 
 def _audit(age_s: float) -> Check:
-    """Whether sweeps seal the audit log; an event that was committed late is older than it looks."""
+    # An event that was committed late is older than it looks.
     if not age_s:
         return Check("audit log", is_ok=True, detail="sealed", is_vital=False)
     detail = f"an event waits to be sealed for {age_s:.0f} s, expected less than {MAX_UNSEALED_AGE_S:.0f} s"
@@ -135,7 +131,7 @@ def _sweep(age_s: float | None) -> Check:
 
 
 def broker() -> Check:
-    """Whether a new connection to the broker answers."""
+    """Check a new connection to the broker."""
     started_s = time.monotonic()
     options: dict[str, Any] = {
         **settings.CELERY_BROKER_TRANSPORT_OPTIONS,
@@ -161,11 +157,7 @@ def _answered(started_s: float) -> str:
 
 @contextmanager
 def _own_connection() -> Iterator[str]:
-    """The alias of a new database connection, closed at the end.
-
-    Not the one that the request would use: that one may wait for a server that has stopped answering, and a
-    new one is what the next worker process will need.
-    """
+    """Yield the alias of a new connection: the request's own may wait for a server that does not answer."""
     configured: dict[str, Any] = {**connections.settings["default"]}
     configured["OPTIONS"] = {**configured.get("OPTIONS", {}), **_limits(configured["ENGINE"])}
     probe = load_backend(configured["ENGINE"]).DatabaseWrapper(configured, PROBE)
@@ -179,7 +171,6 @@ def _own_connection() -> Iterator[str]:
 
 
 def _limits(engine: str) -> dict[str, Any]:
-    """Options that keep a question to the database within `CHECK_TIMEOUT_S`."""
     if "postgresql" not in engine:
         return {"timeout": CHECK_TIMEOUT_S, "init_command": ""}
     milliseconds = CHECK_TIMEOUT_S * 1000

@@ -1,9 +1,7 @@
-"""Logging: one line an event, readable in a terminal, JSON for machines.
+"""Logging: one line an event, columns for people or JSON for machines.
 
-Lines about a submission carry `submission_id` and `evaluation_id`, those of one request `request_id`, those
-of one task `task_id`. What nobody may read in a log (tokens, passwords in addresses, e-mail addresses, the
-keys in links that were mailed) is not logged to begin with; the last step of every line takes out what slips
-in with a library's message or a traceback.
+Lines carry `submission_id`, `evaluation_id`, `request_id` or `task_id`. Secrets are not logged to begin with;
+the last step removes those in messages of libraries and tracebacks.
 """
 
 import logging
@@ -34,30 +32,19 @@ SECRETS: Final = (
 
 
 def without_secrets(text: str) -> str:
-    """The text with everything that looks like a secret or an e-mail address taken out.
-
-    >>> without_secrets("GET /accounts/password/reset/key/4-abc-def/ by ada@example.org")
-    'GET /accounts/password/reset/key/[hidden] by [address hidden]'
-    >>> without_secrets("Forbidden (CSRF token missing.): /team/join/OTU0bQ-x_y/")
-    'Forbidden (CSRF token missing.): /team/join/[hidden]'
-    >>> without_secrets("redis://:swordfish@cache:6379/0 refused")
-    'redis://[hidden]@cache:6379/0 refused'
-    """
+    """Hide everything that looks like a secret or an e-mail address."""
     for pattern, stand_in in SECRETS:
         text = pattern.sub(stand_in, text)
     return text
 
 
 class CleanFormatter(structlog.stdlib.ProcessorFormatter):
-    """Writes a line, then takes out what must not be in it."""
-
+    # Last, so that tracebacks and messages of libraries are cleaned as well.
     def format(self, record: logging.LogRecord) -> str:
-        """The line as it goes out."""
         return without_secrets(super().format(record))
 
 
 def _shared() -> list[Processor]:
-    """What every line gets, our own and the libraries' alike."""
     return [
         structlog.contextvars.merge_contextvars,
         structlog.stdlib.add_log_level,
@@ -67,7 +54,6 @@ def _shared() -> list[Processor]:
 
 
 def formatter(*, as_json: bool) -> logging.Formatter:
-    """JSON for machines, or columns for people."""
     last: list[Processor]
     if as_json:
         last = [structlog.processors.format_exc_info, structlog.processors.JSONRenderer(default=str)]
@@ -98,7 +84,7 @@ def configure() -> None:
 
 
 def logging_settings(*, as_json: bool, level: str, has_reports: bool = False) -> dict[str, Any]:
-    """The value of Django's `LOGGING`: everything to standard error, in one form; faults by mail as well."""
+    """Return the value of Django's `LOGGING`: everything to standard error, faults by mail as well."""
     reports: dict[str, Any] = {
         "class": "leaderboard.mails.fault_reports.FaultReportHandler",
         "formatter": "line",

@@ -1,9 +1,7 @@
-"""Figures for Prometheus, read from the database when they are asked for.
+"""Figures for Prometheus, read from the database at each scrape, so they are the same from every process.
 
-So they are the same from every process on every machine, and a restart loses nothing. Five statements a
-scrape; the counters are counts of rows that never change again. Figures of HTTP alone are a process's own:
-processes of one gunicorn share a directory, `PROMETHEUS_MULTIPROC_DIR`, which `deploy/gunicorn.conf.py`
-makes, so that a scrape of any of them has the sum.
+Figures of HTTP are a process's own; processes of one gunicorn share `PROMETHEUS_MULTIPROC_DIR`, made by
+`deploy/gunicorn.conf.py`.
 """
 
 import os
@@ -25,21 +23,18 @@ PRIORITIES: Final = {Evaluation.PRIORITY_LIVE: "live", Evaluation.PRIORITY_RESCO
 
 
 def exposition() -> bytes:
-    """All figures in Prometheus' text format. Raises the database's error if it does not answer."""
+    """Return all figures in Prometheus' text format. Raises the database's error."""
     ours = CollectorRegistry(auto_describe=False)
     ours.register(DatabaseCollector())
     return generate_latest(ours) + generate_latest(registry())
 
 
 class DatabaseCollector(Collector):
-    """Reads the queue, the runs and the sweep."""
-
     def describe(self) -> Iterable[Metric]:
-        """Nothing: registering must not ask the database."""
+        # Registering must not ask the database.
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """Every figure, from five statements."""
         yield from _queue(list(_by_status()))
         yield _gauge(
             "tsttc_last_sweep_age_seconds",
@@ -195,7 +190,7 @@ def count(*, method: str, route: str, status: int, took_s: float) -> None:
 
 
 def registry() -> CollectorRegistry:
-    """The figures of this process, or of all that share its directory."""
+    """Return the figures of this process, or of all that share its directory."""
     if not os.environ.get(SHARED):
         return _OWN
     together = CollectorRegistry()

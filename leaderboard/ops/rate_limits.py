@@ -1,7 +1,6 @@
-"""Rate limits: throttles of Django REST framework, for the API, for pages and for comparisons.
+"""Rate limits of the API, of pages and of comparisons.
 
-A rate of 60 a minute lets 60 requests of the last minute through. Reading is counted by each process in its
-memory, which asks the database nothing; what is sent is counted in Django's cache, by all processes together.
+Reads are counted in each process's memory, writes in Django's cache for all processes together.
 """
 
 import hashlib
@@ -25,9 +24,9 @@ IN_PROCESS: Final = LocMemCache("rate_limits", {"OPTIONS": {"MAX_ENTRIES": 10_00
 
 
 def address_of(request: Any) -> str:
-    """The address of a request. IPv6 addresses count as one if their first 64 bits are equal.
+    """Return the address of a request, or with `TSTTC_TRUSTED_PROXIES` that in our proxy's header.
 
-    It is that of the connection, or with `TSTTC_TRUSTED_PROXIES` the one in our own proxy's header.
+    IPv6 addresses count as one if their first 64 bits are equal.
     """
     try:
         address = ip_address(BaseThrottle().get_ident(request))
@@ -37,17 +36,17 @@ def address_of(request: Any) -> str:
 
 
 def account_or_address(request: Any) -> str:
-    """The account that asks, wherever it comes from; else the address."""
+    """Return the account, or the address of a visitor."""
     return f"account:{request.user.pk}" if request.user.is_authenticated else address_of(request)
 
 
 def refusal(wait_s: float) -> str:
-    """The sentence for a client that asked too often, on pages and in the API."""
+    """Return the message for a client that asked too often."""
     return f"Too many requests in a short time; the next one is answered in {math.ceil(wait_s)} s."
 
 
 class Throttle(SimpleRateThrottle):
-    """A rate of the settings, which may be None; `n_left` and `wait_s` are known once it has counted."""
+    """A rate of the settings, which may be None; `n_left` and `wait_s` are known after a request."""
 
     cache: BaseCache = IN_PROCESS
     rates = "API_RATES"
@@ -57,36 +56,32 @@ class Throttle(SimpleRateThrottle):
     duration: int  # in seconds
 
     def get_rate(self) -> str | None:
-        """The rate as the settings have it now."""
         rate: str | None = getattr(settings, self.rates)[self.scope]
         return rate
 
     def allow_request(self, request: Any, view: "APIView | None" = None) -> bool:
-        """Count this request."""
         return bool(super().allow_request(request, view))  # type: ignore[arg-type]  # pages have no view
 
     def identity(self, request: Any) -> object | None:
-        """Who is counted: the address. None: this throttle does not apply."""
+        """Return what is counted; None where this throttle does not apply."""
         return address_of(request)
 
     def get_cache_key(self, request: Any, view: "APIView | None") -> str | None:
-        """A hash, so that no address or account is in the cache."""
+        # A hash, so that no address or account is in the cache.
         who = self.identity(request)
         text = f"{self.rates}:{self.scope}:{who}"
         return None if who is None else f"rate:{hashlib.sha256(text.encode()).hexdigest()}"
 
     @property
     def n_left(self) -> int:
-        """How many more are let through now."""
         return max(0, self.num_requests - len(self.history))
 
     @property
     def wait_s(self) -> float:
-        """Seconds until the next is let through."""
         return 0.0 if self.n_left else self.wait() or 0.0
 
 
 def purge_expired(*, now: datetime) -> int:
-    """Remove what has expired in the table of Django's cache. Returns how many rows."""
+    """Delete expired rows of Django's cache. Returns how many."""
     n_values, _ = CachedValue.objects.filter(expires__lt=now).delete()
     return n_values

@@ -1,4 +1,4 @@
-"""Pages whose text a maintainer edits: each has a text from the start, and keeps every text that it had."""
+"""Pages whose text maintainers edit; each has a default, and every version is kept."""
 
 import hashlib
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ IMPRINT: Final = "imprint"
 
 @dataclass(frozen=True)
 class SitePage:
-    """A page: its name in addresses, its title, and what belongs on it."""
+    """A page: name in addresses, title, and what belongs on it."""
 
     name: str
     title: str
@@ -46,17 +46,17 @@ PAGES: Final[Mapping[str, SitePage]] = {
 
 
 def current(name: str) -> PageVersion | None:
-    """The text that is shown; None while it is the one that comes with the software."""
+    """Return the text of maintainers that is shown, if any."""
     return PageVersion.objects.filter(page=name).select_related("written_by").order_by("-number").first()
 
 
 def versions(name: str) -> list[PageVersion]:
-    """Every text that maintainers gave the page, the newest first."""
+    """Return every version of the page, newest first."""
     return list(PageVersion.objects.filter(page=name).select_related("written_by").order_by("-number"))
 
 
 def default_text(name: str) -> str:
-    """The text that comes with the software, with this site's own names and limits in it."""
+    """Render the default text with this site's names and limits."""
     facts = {
         "site_name": settings.SITE_NAME,
         "site_url": settings.SITE_URL,
@@ -68,10 +68,9 @@ def default_text(name: str) -> str:
 
 
 def edit(*, name: str, text: str, replaces: int, actor: User | None, now: datetime) -> PageVersion:
-    """Give the page another text. `replaces` is the number of the version that was edited; 0 is the default.
+    """Save a new version of a page. `replaces` is the number of the edited version; 0 is the default.
 
-    Raises `NotMaintainer`, and `Refused` for a text that is empty, too long or the same, and where somebody
-    has changed the page meanwhile.
+    Raises `NotMaintainer`, and `Refused` for a bad text or one edited by somebody else meanwhile.
     """
     require_maintainer(actor, to="edit pages")
     text = clean_text("text", text.replace("\r\n", "\n"), limit=MAX_TEXT) + "\n"
@@ -101,7 +100,7 @@ def _changed_meanwhile() -> Refused:
 
 
 def check_contact(app_configs: object = None, **kwargs: object) -> list[CheckMessage]:
-    """A hint of `check --deploy`: the pages name the sender of mails as the contact, who may read none."""
+    """Warn that the pages name the sender of mails as the contact, whose mailbox may not be read."""
     if settings.PRODUCTION and settings.CONTACT_EMAIL == settings.DEFAULT_FROM_EMAIL:
         hint = "Set TSTTC_CONTACT_EMAIL, and write the imprint at /maintain/pages/imprint/."
         message = f"The pages give the sender of mails, {settings.CONTACT_EMAIL}, as the contact."

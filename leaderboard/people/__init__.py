@@ -1,4 +1,1 @@
-"""People: teams, invitations, API tokens, and names that look alike.
-
-Methods, submissions and the entry points import this room.
-"""
+"""People: teams, invitations, API tokens, and names that look alike."""

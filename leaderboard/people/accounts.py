@@ -1,4 +1,4 @@
-"""Accounts, locked while something is written that belongs to one."""
+"""Locks of accounts, and the role of maintainers."""
 
 from django.db import transaction
 
@@ -10,25 +10,25 @@ MAX_REASON = 500
 
 
 def hold(user: User) -> User:
-    """The account, locked."""
+    """Lock and return the account."""
     return User.objects.select_for_update(no_key=True).get(pk=user.pk)
 
 
 def hold_open(user: User) -> User:
-    """The same. Raises `Refused` for an account that is closed or deleted."""
+    """Lock and return the account. Raises `Refused` if it is closed or deleted."""
     row = hold(user)
     require_open(row)
     return row
 
 
 def require_open(row: User) -> None:
-    """Raise `Refused` for an account that is closed or deleted."""
+    """Raise `Refused` if the account is closed or deleted."""
     if not row.is_active:
         raise Refused("account-closed", "This account is closed or deleted.")
 
 
 def set_maintainer(*, user: User, is_maintainer: bool, reason: str) -> User:
-    """Give the role of a maintainer to an account, or end it. Raises `Refused`."""
+    """Give or end the role of a maintainer. Raises `Refused`."""
     reason = clean_text("reason", reason, limit=MAX_REASON)
     with transaction.atomic():
         row = hold_open(user) if is_maintainer else hold(user)

@@ -1,7 +1,4 @@
-"""Email addresses where the site proves them: an unproved one takes nothing from its owner.
-
-An account that was never confirmed gives way to the next sign-up, and is deleted after a day.
-"""
+"""Email addresses. An account that was never confirmed gives way to the next sign-up."""
 
 from datetime import datetime, timedelta
 
@@ -16,7 +13,7 @@ UNCONFIRMED_FOR = timedelta(days=1)
 
 
 def accounts_of(address: str) -> QuerySet[User]:
-    """The accounts with this address; where the site proves addresses, those that have proved it."""
+    """Return the accounts with this address; only proved ones where the site proves addresses."""
     has_it = Q(email__iexact=address)
     if not are_proved():
         return User.objects.filter(has_it | Exists(_rows().filter(email__iexact=address)))

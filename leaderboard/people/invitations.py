@@ -24,12 +24,12 @@ _SECRET = re.compile(r"[A-Za-z0-9_-]{43}")
 
 
 class UnusableInvitation(Refused):
-    """The invitation was used, was revoked or has expired."""
+    pass
 
 
 @dataclass(frozen=True)
 class Meaning:
-    """What accepting would do: the team left, and the methods of a team of one that come along."""
+    """The effect of accepting: the team left, and the methods of a team of one that come along."""
 
     invitation: Invitation
     left: Team | None
@@ -64,17 +64,15 @@ def make(*, team: Team, actor: User, now: datetime) -> tuple[Invitation, str]:
 
 
 def link(secret: str) -> str:
-    """The address that lets its reader in."""
     return settings.SITE_URL + reverse("join_team", args=[secret])
 
 
 def open_invitations(*, team: Team, now: datetime) -> "QuerySet[Invitation]":
-    """The team's invitations that can still be used."""
+    """Return the team's invitations that can still be used."""
     return Invitation.objects.filter(team=team, accepted_at=None, revoked_at=None, expires_at__gt=now)
 
 
 def state_of(invitation: Invitation, *, now: datetime) -> str:
-    """In a word what has become of it."""
     if invitation.accepted_at:
         return "used"
     if invitation.revoked_at:
@@ -97,7 +95,7 @@ def revoke(*, invitation: Invitation, actor: User, now: datetime) -> bool:
 
 
 def find(*, secret: str, now: datetime) -> Invitation | None:
-    """The invitation of this link; None if there is none. Raises `UnusableInvitation` if it has ended."""
+    """Find the invitation of a link. Raises `UnusableInvitation` if it has ended."""
     if not _SECRET.fullmatch(secret):
         return None
     row = Invitation.objects.select_related("team", "created_by").filter(secret_hash=_hash(secret)).first()
@@ -107,7 +105,7 @@ def find(*, secret: str, now: datetime) -> Invitation | None:
 
 
 def meaning(*, invitation: Invitation, user: User) -> Meaning:
-    """What accepting would do, for the page that asks first."""
+    """Return the effect of accepting, for the page that asks first."""
     membership = Membership.objects.filter(user=user).select_related("team").first()
     left = membership.team if membership else None
     comes_along = left is not None and not left.memberships.exclude(user=user).exists()

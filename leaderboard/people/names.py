@@ -1,4 +1,4 @@
-"""Names that people choose: which are taken, and which look alike (UTS 39)."""
+"""Names that people choose: taken ones, and look-alikes (UTS 39)."""
 
 import unicodedata
 from collections.abc import Callable, Iterable, Mapping
@@ -29,19 +29,17 @@ _MAX_MARKS = 2
 
 
 def skeleton(name: str) -> str:
-    """What a name looks like, as a key of at most `MAX_LOOK` characters: equal ones are taken for each other.
+    """Return a key of at most `MAX_LOOK` characters; names with equal keys look alike.
 
     >>> skeleton("Foo  Lab") == skeleton("ｆｏｏ lab") == skeleton("Fоο Lаb")
     True
-    >>> skeleton("Foo Lab 2") == skeleton("Foo Lab 3")
-    False
     """
     folded = "".join(_folded(character) for character in unicodedata.normalize("NFKD", name))
     return " ".join(folded.casefold().translate(_ONE_LOOK).split())[:MAX_LOOK]
 
 
 def clean_name(field: str, text: str) -> str:
-    """A name as it is saved and shown. Raises `Refused` for an empty one or characters without ink."""
+    """Clean a name. Raises `Refused` for an empty one or invisible characters."""
     text = clean_text(field, _with_plain_spaces(text), limit=MAX_NAME)
     n_marks = 0
     for character in text:
@@ -83,13 +81,13 @@ def require_rename_possible(*, renamed_at: datetime | None, now: datetime) -> No
 
 
 def confusable_with(name: str, others: Iterable[str]) -> str | None:
-    """The first of the other names that this one would be taken for."""
+    """Return the first of the other names that looks like this one."""
     wanted = skeleton(name)
     return next((other for other in others if skeleton(other) == wanted), None)
 
 
 def numbered(wanted: str, *, is_taken: Callable[[str], object]) -> str:
-    """The name, with the first number under which it is not taken."""
+    """Add the first number under which the name is free."""
     name, number = wanted, 1
     while is_taken(name):
         number += 1
@@ -99,13 +97,12 @@ def numbered(wanted: str, *, is_taken: Callable[[str], object]) -> str:
 
 
 def _with_plain_spaces(text: str) -> str:
-    """Every space as the one of the keyboard, and never two in a row."""
     spaced = "".join(" " if unicodedata.category(character) == "Zs" else character for character in text)
     return " ".join(part for part in spaced.split(" ") if part)
 
 
 def _folded(character: str) -> str:
-    """What one character is taken for. Marks above and below letters are too small to tell names apart."""
+    # Marks above and below letters are too small to tell names apart.
     category = unicodedata.category(character)
     if character.isascii():
         return character
@@ -126,7 +123,6 @@ def _folded(character: str) -> str:
 
 @cache
 def _prototypes() -> Mapping[str, str]:
-    """Each confusable character and what it is taken for, without marks."""
     from confusable_homoglyphs.confusables import (  # noqa: PLC0415 - a list of 0.9 MB, which few processes need
         confusables_data,
     )

@@ -1,4 +1,4 @@
-"""The second factor of an account, which allauth keeps and asks for: who must have one, and its reset."""
+"""The second factor of an account, kept by allauth: who must have one, and its reset."""
 
 from allauth.mfa.models import Authenticator
 from django.conf import settings
@@ -10,20 +10,17 @@ from leaderboard.models import AuditEvent, User
 
 
 def is_required(user: User) -> bool:
-    """Whether this person acts as a maintainer only with a second factor."""
+    """Tell whether this person acts as a maintainer only with a second factor."""
     return bool(settings.REQUIRE_SECOND_FACTOR) and user.is_maintainer
 
 
 def is_set_up(user: User) -> bool:
-    """Whether an app makes codes for this account."""
+    """Tell whether an authenticator app is set up."""
     return Authenticator.objects.filter(user=user, type=Authenticator.Type.TOTP).exists()
 
 
 def reset(*, user: User, reason: str) -> AuditEvent:
-    """Delete the second factor and recovery codes of an account. Returns the audit event.
-
-    Raises `Refused` without a reason, and for an account without a second factor.
-    """
+    """Delete an account's second factor and recovery codes. Raises `Refused` without a reason or a factor."""
     reason = clean_text("reason", reason, limit=500)
     with transaction.atomic():
         n_deleted, _ = Authenticator.objects.filter(user=user).delete()

@@ -1,6 +1,6 @@
-"""Teams: who competes. A person is in one team at a time; a person alone is a team of one.
+"""Teams: a person is in one at a time; a person alone is a team of one.
 
-What changes who is in a team locks, in this order: the person, the teams by their ids, the invitation.
+Changes of members lock, in this order: the person, the teams by their ids, the invitation.
 """
 
 import secrets
@@ -17,12 +17,11 @@ from leaderboard.people.names import MAX_NAME, clean_name, numbered, require_ren
 
 
 def current_team_of(*, user: User) -> Team | None:
-    """The person's team, if there is one yet."""
     return Team.objects.filter(memberships__user=user).first()
 
 
 def team_of(*, user: User) -> Team:
-    """The person's team; a person without one becomes a team of one."""
+    """Return the person's team; make a team of one for a person without."""
     present = current_team_of(user=user)
     if present is not None:
         return present
@@ -36,7 +35,7 @@ def team_of(*, user: User) -> Team:
 
 
 def create(*, user: User, name: str, now: datetime) -> Team:
-    """Found a team under a name of one's choice. Raises `Refused`."""
+    """Found a team with a name. Raises `Refused`."""
     name = clean_name("name", name)
     with transaction.atomic():
         accounts.hold_open(user)
@@ -48,7 +47,7 @@ def create(*, user: User, name: str, now: datetime) -> Team:
 
 
 def rename(*, team: Team, name: str, actor: User, now: datetime) -> Team:
-    """Call the team something else, on every board at once. Its owner does, once a day. Raises `Refused`."""
+    """Rename the team, as its owner, at most once a day. Raises `Refused`."""
     name = clean_name("name", name)
     with transaction.atomic():
         row = locked_team(team)
@@ -66,7 +65,7 @@ def rename(*, team: Team, name: str, actor: User, now: datetime) -> Team:
 
 
 def set_name(*, team: Team, name: str, now: datetime) -> None:
-    """Give a team that the caller has locked a clean name. Raises `Refused` for one that is taken."""
+    """Name a team that the caller has locked. Raises `Refused` for a taken name."""
     if _public_twin(name, but=team):
         raise _taken(name)
     team.name, team.look, team.renamed_at = name, skeleton(name), now
@@ -90,7 +89,7 @@ def show_name(team: Team) -> None:
 
 
 def show_name_in_any_case(team: Team) -> None:
-    """The same, with a number added to a name that is taken."""
+    """Mark the name as public, with a number added if it is taken."""
     name = numbered(team.name, is_taken=lambda name: _public_twin(name, but=team))
     if name != team.name:
         Team.objects.filter(pk=team.pk).update(name=name, look=skeleton(name))
@@ -103,13 +102,13 @@ def show_name_in_any_case(team: Team) -> None:
 
 
 def require_showable(team: Team) -> None:
-    """Raise `Refused` where another team on the boards looks like this one."""
+    """Raise `Refused` where another team on the boards has a similar name."""
     if not team.is_shown and _public_twin(team.name, but=team):
         raise _taken_first(team.name)
 
 
 def leave(*, user: User) -> Team:
-    """Leave one's team, which keeps what was sent from it. Returns that team. Raises `Refused`."""
+    """Leave one's team. Returns it. Raises `Refused`."""
     with transaction.atomic():
         membership = current_membership(user)
         if membership is None:
@@ -143,7 +142,7 @@ def remove(*, team: Team, member: User, actor: User) -> None:
 
 
 def hand_over(*, team: Team, to: User, actor: User) -> None:
-    """Let another member own the team. Raises `Refused`."""
+    """Make another member the owner. Raises `Refused`."""
     with transaction.atomic():
         row = locked_team(team)
         require_owner(row, actor, doing="hands it over")
@@ -156,7 +155,7 @@ def hand_over(*, team: Team, to: User, actor: User) -> None:
 
 
 def appoint(*, team: Team, to: User, reason: str, actor: User | None) -> None:
-    """Make a member the owner, where the owner is gone. Raises `NotMaintainer` and `Refused`."""
+    """Make a member the owner, as a maintainer. Raises `NotMaintainer` and `Refused`."""
     require_maintainer(actor, to="appoint owners of teams")
     with transaction.atomic():
         row = locked_team(team)
@@ -178,19 +177,19 @@ def require_owner(team: Team, actor: User, *, doing: str) -> None:
 
 
 def require_member(team: Team, user: User) -> None:
-    """Raise `Refused` for a user who is not in the team, or not any more."""
+    """Raise `Refused` for a user who is not in the team."""
     if not team.memberships.filter(user=user).exists():
         raise Refused("not-your-team", f"You are not in the team {team.name!r} any more; try again.")
 
 
 def locked(*teams: Team | None) -> list[Team]:
-    """These teams as they are now, which stay so until the transaction ends, in the order of their ids."""
+    """Lock and return these teams, in the order of their ids."""
     ids = [team.pk for team in teams if team is not None]
     return list(Team.objects.select_for_update(no_key=True).filter(pk__in=ids).order_by("pk"))
 
 
 def locked_team(team: Team) -> Team:
-    """The team as it is now, locked. Raises `Refused` if it was deleted meanwhile."""
+    """Lock and return the team. Raises `Refused` if it was deleted."""
     rows = locked(team)
     if not rows:
         raise Refused("changed-meanwhile", f"The team {team.name!r} was just deleted; reload the page.")
@@ -198,7 +197,7 @@ def locked_team(team: Team) -> Team:
 
 
 def current_membership(user: User, *also: Team) -> Membership | None:
-    """Where the person is, with that team and these others locked. Raises `Refused` if that changed."""
+    """Return the person's membership, its team and these others locked. Raises `Refused` if it changed."""
     accounts.hold(user)
     seen = Membership.objects.filter(user=user).select_related("team").first()
     locked(*also, seen.team if seen else None)
@@ -221,7 +220,7 @@ def end_if_empty(team: Team) -> bool:
 
 
 def end_invitations(team: Team, *, of: User) -> None:
-    """Revoke the links that a former member made."""
+    """Revoke the invitations of a former member."""
     links = Invitation.objects.filter(team=team, created_by=of, accepted_at=None, revoked_at=None)
     links.update(revoked_at=Now())
 
@@ -251,13 +250,13 @@ def _taken_first(name: str) -> Refused:
 
 
 def _public_twin(name: str, *, but: Team | None = None) -> bool:
-    """Whether a public team has a name like it. Other teams take no name."""
+    # Only public teams take a name.
     shown = Team.objects.filter(look=skeleton(name), is_shown=True)
     return (shown.exclude(pk=but.pk) if but is not None else shown).exists()
 
 
 def _created(team: Team, user: User) -> Team:
-    """The new team with its first member; or the one that another request of the same person made first."""
+    # Another request of the same person may have made the team first.
     try:
         with transaction.atomic():
             Membership.objects.create(team=team, user=user, is_owner=True)

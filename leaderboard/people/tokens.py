@@ -27,7 +27,7 @@ USED_EVERY = timedelta(minutes=1)
 
 
 class UnusableToken(Exception):
-    """The token opens nothing (any more); the text says why, `code` is stable."""
+    """The token is not valid; `code` is stable."""
 
     def __init__(self, code: str, message: str) -> None:
         super().__init__(message)
@@ -44,10 +44,7 @@ def create(
     days: int = DAYS,
     actor: User | None = None,
 ) -> str:
-    """Make a token of that person, which is not saved. Without `split_name` it is good for every split.
-
-    Raises `Refused`.
-    """
+    """Make a token, for every split without `split_name`. Returns its secret. Raises `Refused`."""
     name = clean_text("name", name, limit=80)
     _check(scopes=scopes, days=days)
     split = shown_split(split_name) if split_name else None
@@ -97,10 +94,7 @@ def _check(*, scopes: Collection[str], days: int) -> None:
 
 
 def use(*, secret: str, now: datetime) -> ApiToken:
-    """The token of this secret, with its owner. When it was last used is noted to the minute.
-
-    Raises `UnusableToken`. What does not look like a token never reaches the database.
-    """
+    """Return the token of this secret with its owner, and note the minute of use. Raises `UnusableToken`."""
     if not PATTERN.fullmatch(secret):
         raise UnusableToken(
             "token-malformed", "The bearer token is malformed; expected tsttc_ and 64 hexadecimal digits."
@@ -132,19 +126,18 @@ def _require_active(row: ApiToken, *, now: datetime) -> None:
 
 
 def is_active(row: ApiToken, *, now: datetime) -> bool:
-    """Whether it still opens something."""
     return row.revoked_at is None and (row.expiry is None or row.expiry > now)
 
 
 def state_of(row: ApiToken, *, now: datetime) -> str:
-    """In one word: in use, expired or revoked."""
+    """Return the state in one word: in use, expired or revoked."""
     if row.revoked_at is not None:
         return "revoked"
     return "in use" if is_active(row, now=now) else "expired"
 
 
 def revoke(*, token: ApiToken, now: datetime, actor: User | None, how: str = "") -> bool:
-    """End a token at once. Returns False if it was revoked already."""
+    """Revoke a token. Returns False if it was revoked already."""
     with transaction.atomic():
         changed = ApiToken.objects.filter(pk=token.pk, revoked_at=None).update(revoked_at=now)
         if changed:
@@ -160,14 +153,14 @@ def revoke(*, token: ApiToken, now: datetime, actor: User | None, how: str = "")
 
 
 def revoke_all(*, user: User, reason: str, actor: User | None, now: datetime) -> None:
-    """End all tokens of a person at once. Raises `NotMaintainer`."""
+    """Revoke all tokens of a person. Raises `NotMaintainer`."""
     require_maintainer(actor, to="revoke tokens of others")
     for token in ApiToken.objects.filter(user=user):
         revoke(token=token, now=now, actor=actor, how=f"by a maintainer: {reason}")
 
 
 def revoke_leaked(*, secret: str, now: datetime) -> None:
-    """Revoke the token of this secret, if there is one; the caller does not learn whether there was."""
+    """Revoke the token of this secret, if any; the caller does not learn whether there was."""
     if PATTERN.fullmatch(secret):
         row = ApiToken.objects.filter(pk=hash_token(secret)).first()
         if row is not None:

@@ -1,4 +1,1 @@
-"""Quotas: how much, and when, a team may submit.
-
-Boards, submissions and the entry points import this room.
-"""
+"""Quotas: how much, and when, a team may submit."""

@@ -1,4 +1,4 @@
-"""When a split takes submissions, and from which teams, in the words of pages, API and command line."""
+"""When a split takes submissions, and from which teams."""
 
 from dataclasses import replace
 from datetime import datetime
@@ -12,7 +12,7 @@ from leaderboard.quotas import usage
 
 
 def refusal_of(*, team: Team | None, split: Split) -> Refused | None:
-    """Why the split takes nothing from this team; None if it does, as far as admission goes."""
+    """Return the reason why this team is not admitted, if any."""
     if not split.needs_admission:
         return None
     if team is not None and Admission.objects.filter(team=team, split=split).exists():
@@ -26,14 +26,14 @@ def refusal_of(*, team: Team | None, split: Split) -> Refused | None:
 
 
 def require(*, team: Team | None, split: Split) -> None:
-    """Raise `Refused` unless the split takes files of this team."""
+    """Raise `Refused` unless the team is admitted."""
     refusal = refusal_of(team=team, split=split)
     if refusal is not None:
         raise refusal
 
 
 def admit(*, team: Team, split: Split, reason: str, actor: User | None, now: datetime) -> Admission:
-    """Let a team submit to a split; once more gives another reason. `actor` None is the command line.
+    """Admit a team to a split, or change the reason. `actor` None is the command line.
 
     Raises `NotMaintainer`, and `Team.DoesNotExist` if the team has just ended.
     """
@@ -53,7 +53,7 @@ def admit(*, team: Team, split: Split, reason: str, actor: User | None, now: dat
 
 
 def end(*, row: Admission, reason: str, actor: User | None) -> None:
-    """Take the admission back; what was sent stays. Raises `NotMaintainer`."""
+    """End an admission; submissions stay. Raises `NotMaintainer`."""
     require_maintainer(actor, to="admit teams")
     with transaction.atomic():
         row.delete()
@@ -62,7 +62,7 @@ def end(*, row: Admission, reason: str, actor: User | None) -> None:
 
 
 def refusal_for_all(split: Split, *, now: datetime) -> Refused | None:
-    """Why a split takes nothing from anybody now; None if it does."""
+    """Return the reason why a split takes nothing from anybody now, if any."""
     code, sentence = "", ""
     opens_at, closes_at = split.opens_at, split.closes_at
     if split.is_archived:
@@ -80,23 +80,23 @@ def refusal_for_all(split: Split, *, now: datetime) -> Refused | None:
 
 
 def is_open(split: Split, *, now: datetime) -> bool:
-    """Whether the split takes submissions from teams that have a slot left."""
+    """Tell whether the split takes submissions from teams that have a slot left."""
     return refusal_for_all(split, now=now) is None
 
 
 def sentence_of(split: Split, *, now: datetime) -> str:
-    """Since when, until when or why not the split takes submissions; empty where nothing limits it."""
+    """Say since when, until when or why not the split takes submissions; may be empty."""
     return str(refusal_for_all(split, now=now) or closing_of(split))
 
 
 def closing_of(split: Split) -> str:
-    """Until when a split that takes submissions does so; empty where nothing limits it."""
+    """Say until when an open split takes submissions; may be empty."""
     at = split.closes_at
     return f"Submissions to {split.pk} close at {at:%Y-%m-%d %H:%M} UTC." if at else ""
 
 
 def left(*, team: Team | None, user: User, split: Split, now: datetime) -> usage.Quota:
-    """What the team has left on the split; none of it can be had while the split takes nothing from it."""
+    """Return the team's quota on the split; none of it is available while the split takes nothing from it."""
     quota = usage.state(team=team, user=user, split=split, now=now)
     refusal = refusal_for_all(split, now=now)
     not_admitted = refusal_of(team=team, split=split)

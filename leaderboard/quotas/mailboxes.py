@@ -1,7 +1,6 @@
-"""What a mailbox has sent stays sent when its account is deleted.
+"""Keyed hashes of deleted accounts' mailboxes, so that deletion gives no new quota.
 
-A keyed hash of each mailbox stays until no window reaches back to its last file. The key comes from
-`SECRET_KEY`: with another one, the hashes match nothing.
+The key comes from `SECRET_KEY`: with another one, the hashes match nothing.
 """
 
 from datetime import datetime, timedelta
@@ -16,7 +15,7 @@ from leaderboard.people import addresses
 
 
 def keep(*, user: User, now: datetime) -> None:
-    """Keep the hashes of an account's mailboxes if it has sent files lately; call it before it is blanked."""
+    """Keep the hashes of an account's mailboxes if it has sent files lately, before it is blanked."""
     sent_at = Submission.objects.filter(submitted_by=user).aggregate(at=Max("submitted_at"))["at"]
     if sent_at is None or not addresses.are_proved():
         return
@@ -29,7 +28,7 @@ def keep(*, user: User, now: datetime) -> None:
 
 
 def deleted_accounts(people: QuerySet[User]) -> list[int]:
-    """The deleted accounts of these people's mailboxes."""
+    """Return the deleted accounts with these people's mailboxes."""
     rows = SpentMailbox.objects.filter(digest__in=_digests(people))
     return list(rows.values_list("account", flat=True))
 
@@ -40,13 +39,12 @@ def delete_expired(*, now: datetime) -> None:
 
 
 def longest_window() -> timedelta:
-    """How far back the rules of any split and team look, a day at least."""
+    """Return the longest window of any split and team, a day at least."""
     rules = [*Split.objects.all(), *QuotaOverride.objects.all()]
     return max(timedelta(days=1), *(span for row in rules for span in (row.quota_window, row.quota_min_gap)))
 
 
 def _digests(people: QuerySet[User]) -> set[str]:
-    """The keyed hashes of their mailboxes: that of the primary address, and of every proved one."""
     proved = EmailAddress.objects.filter(user__in=people, verified=True).annotate(mailbox=MAILBOX)
     mailboxes = people.values_list("mailbox", flat=True).union(proved.values_list("mailbox", flat=True))
     return {salted_hmac(__name__, mailbox, algorithm="sha256").hexdigest() for mailbox in mailboxes}

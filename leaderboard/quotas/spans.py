@@ -1,4 +1,4 @@
-"""Spans of time in words, as rules of quotas have them."""
+"""Spans of time in words, as in the rules of quotas."""
 
 import re
 from datetime import timedelta
@@ -9,12 +9,10 @@ from leaderboard.models.quotas import MAX_SPAN
 
 
 def span(time: timedelta) -> str:
-    """A span of time in words.
+    """Word a span of time.
 
     >>> span(timedelta(days=30)), span(timedelta(days=1)), span(timedelta(minutes=90))
     ('30 days', '24 hours', '90 minutes')
-    >>> span(timedelta(0)), span(timedelta(days=-3)), span(timedelta(seconds=0.4))
-    ('0 seconds', '-3 days', '0 seconds')
     """
     seconds = round(time.total_seconds())
     if seconds < 0:
@@ -36,7 +34,7 @@ _SPAN: Final = re.compile(rf"\s*([\d,]{{1,12}})\s*({'|'.join(_UNITS)})s?\s*", re
 
 
 def parse_span(text: str, *, field: str = "") -> timedelta:
-    """The span of a text such as `spans.span` writes, also of none (0 days). Raises `Refused`."""
+    """Parse a span as `span` writes it, also 0 days. Raises `Refused`."""
     match = _SPAN.fullmatch(text)
     number = match[1].replace(",", "") if match else ""
     if match is None or not number:

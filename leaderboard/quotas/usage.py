@@ -1,12 +1,9 @@
-"""Quotas: how much a team may still send to a split, and when the next slot opens.
+"""Quotas: how much a team may still submit to a split, and when the next slot opens.
 
-Nothing is counted up or down: what is spent follows from the submissions and what came of them. A submission
-costs a slot while it waits or runs, and for good once it is scored. Rejected and cancelled files, and those
-that stopped the process that read them, cost none, but have a limit of their own. All files that a team sends
-within a day have a number of bytes in common.
-
-Quota follows people: a team has spent what its methods got, from whomever, and what those who are in it now
-have sent, from wherever. Accounts of one mailbox are one person's, deleted ones included (see `mailboxes`).
+Use follows from the submissions: one costs a slot while it waits or runs, and for good once it is scored.
+Rejected and cancelled files, and those that crashed their reader, have a limit of their own; a limit of bytes
+a day covers all. Quota follows people: a team has used what its methods got, and what its present members
+have sent anywhere. Accounts of one mailbox are one person's, deleted ones included (`mailboxes`).
 """
 
 import math
@@ -32,7 +29,7 @@ UNLIMITED = QuotaOverride(quota_limit=None, quota_rejected_limit=None)
 
 
 class QuotaExceeded(Exception):
-    """The team has no slot now; `quota` says how many it has, and when the next one opens."""
+    """The team has no slot now."""
 
     code = "quota-exceeded"
     field = "split"
@@ -44,7 +41,7 @@ class QuotaExceeded(Exception):
 
 @dataclass(frozen=True)
 class Quota:
-    """What a team has spent on a split, and what is left at a moment.
+    """The use of a split by a team, and what is left.
 
     `next_slot_at` is None while a slot is open, and where none will ever open by itself.
     """
@@ -59,47 +56,44 @@ class Quota:
 
     @property
     def limit(self) -> int | None:
-        """Submissions within the window; None is without limit."""
+        """Return the submissions within the window; None is without limit."""
         return self.rules.quota_limit
 
     @property
     def left(self) -> int | None:
-        """How many of them are not spent."""
         return None if self.limit is None else max(0, self.limit - self.used)
 
     @property
     def window_s(self) -> float:
-        """The rolling window in seconds."""
         return self.rules.quota_window.total_seconds()
 
     @property
     def min_gap_s(self) -> float:
-        """The least time between two submissions in seconds."""
         return self.rules.quota_min_gap.total_seconds()
 
     def retry_after_s(self, *, now: datetime) -> int | None:
-        """Whole seconds until the next slot; None where none opens by itself."""
+        """Return whole seconds until the next slot; None where none opens by itself."""
         if self.next_slot_at is None:
             return None
         return max(1, math.ceil((self.next_slot_at - now).total_seconds()))
 
 
 def rules_of(*, team: Team | None, split: Split) -> QuotaRules:
-    """The team's own rules on a split, else the split's."""
+    """Return the team's own rules on a split, else the split's."""
     if not settings.QUOTAS:
         return UNLIMITED
     return QuotaOverride.objects.filter(team=team, split=split).first() or split
 
 
 def state(*, team: Team | None, user: User, split: Split, now: datetime) -> Quota:
-    """The team's quota on the split; that of the user if they have no team."""
+    """Return the team's quota on the split; that of the user without a team."""
     rules = rules_of(team=team, split=split)
     spent, rejected = _spent(team=team, user=user, split=split, rules=rules, now=now)
     return weigh(split=split, rules=rules, spent=spent, rejected=rejected, now=now)
 
 
 def lock(*, team: Team) -> bool:
-    """Lock the team's quota until this transaction ends. Returns whether the team is still there."""
+    """Lock the team's quota until this transaction ends. Returns whether the team still exists."""
     # The teams of other accounts of its people spend the same quota.
     others = Membership.objects.filter(user__mailbox__in=team.members.values("mailbox")).values("team")
     rows = Team.objects.select_for_update(no_key=True).filter(Q(pk=team.pk) | Q(pk__in=others))
@@ -107,10 +101,7 @@ def lock(*, team: Team) -> bool:
 
 
 def hold_accounts(*, user: User) -> None:
-    """Lock the accounts of this mailbox, so that two of them cannot take one slot.
-
-    Raises `Refused` for an account that is closed or deleted.
-    """
+    """Lock the accounts of this mailbox: two of them cannot take one slot. Raises `Refused` if closed."""
     same = Q(pk=user.pk) | Q(mailbox__in=User.objects.filter(pk=user.pk).values("mailbox"))
     rows = User.objects.select_for_update(no_key=True).filter(same).order_by("pk")
     accounts.require_open({row.pk: row for row in rows}[user.pk])
@@ -128,7 +119,6 @@ def require(*, team: Team | None, user: User, split: Split, size_bytes: int, now
 
 
 def _is_rejected() -> Q:
-    """Submissions that were rejected, cancelled by their team, or stopped the process that read them."""
     evaluations = Evaluation.objects.filter(submission=OuterRef("pk"))
     live = evaluations.filter(priority=Evaluation.PRIORITY_LIVE)
     # By its team: those of an edition that was given up are cancelled as well.
@@ -140,7 +130,7 @@ def _is_rejected() -> Q:
 def _spent(
     *, team: Team | None, user: User, split: Split, rules: QuotaRules, now: datetime
 ) -> tuple[list[datetime], list[datetime]]:
-    """When the team and its people sent what costs a slot, and what was rejected or cancelled, in order."""
+    """Return the times of submissions that cost a slot, and of rejected or cancelled ones, in order."""
     since = now - max(rules.quota_window, rules.quota_min_gap, DAY)
     evaluations = Evaluation.objects.filter(submission=OuterRef("pk"))
     # Scoring anew after a correction costs nothing. It gives a slot back where the board cannot score what
@@ -170,13 +160,12 @@ def _spent(
 
 
 def _theirs(team: Team | None, user: User) -> Q:
-    """What the team got from anybody, and what its people sent to anybody, from whatever account."""
+    """Match what anybody sent for the team, and what its people sent anywhere."""
     theirs = Q(submitted_by__in=_accounts(team, user).values("pk"))
     return theirs if team is None else theirs | Q(method__team=team)
 
 
 def _accounts(team: Team | None, user: User) -> QuerySet[User]:
-    """The accounts of the team's people, or of this person without a team."""
     # Where addresses are not proved, anybody could spend somebody else's quota under an address like theirs.
     people = User.objects.filter(membership__team=team) if team else User.objects.filter(pk=user.pk)
     if not addresses.are_proved():
@@ -187,7 +176,7 @@ def _accounts(team: Team | None, user: User) -> QuerySet[User]:
 
 
 def _with_bytes(quota: Quota, *, team: Team | None, user: User, size_bytes: int, now: datetime) -> Quota:
-    """The quota, closed if this file is more than the team's bytes of a day leave room for."""
+    """Close the quota if this file exceeds the team's bytes of a day."""
     limit: int = settings.MAX_TEAM_BYTES_PER_DAY
     rows = Submission.objects.filter(_theirs(team, user), submitted_at__gt=now - DAY)
     sent = list(rows.order_by("submitted_at").values_list("submitted_at", "size_bytes"))
@@ -213,7 +202,7 @@ def _with_bytes(quota: Quota, *, team: Team | None, user: User, size_bytes: int,
 def weigh(
     *, split: Split, rules: QuotaRules, spent: Sequence[datetime], rejected: Sequence[datetime], now: datetime
 ) -> Quota:
-    """The quota of a team that sent at these times, oldest first: what costs a slot, what was rejected."""
+    """Compute the quota from times, oldest first: of submissions that cost a slot, and of rejected ones."""
     in_window = [at for at in spent if at > now - rules.quota_window]
     rejected = [at for at in rejected if at > now - DAY]
     full_until = _until(in_window, limit=rules.quota_limit, window=rules.quota_window)
@@ -248,7 +237,7 @@ def weigh(
 
 
 def _until(times: Sequence[datetime], *, limit: int | None, window: timedelta) -> datetime | None:
-    """When fewer than `limit` of these lie in the rolling window; None if that is so already, or never."""
+    """Return when fewer than `limit` of these lie in the window; None if that is so already, or never."""
     if not limit or len(times) < limit:
         return None
     return times[len(times) - limit] + window
@@ -265,7 +254,6 @@ def _left(rules: QuotaRules, *, n_used: int) -> str:
 
 
 def _minute_after(at: datetime) -> datetime:
-    """The first whole minute that is not before this moment."""
     whole = at.replace(second=0, microsecond=0)
     return whole if whole == at else whole + timedelta(minutes=1)
 
@@ -285,10 +273,9 @@ def override(
     actor: User | None,
     now: datetime,
 ) -> QuotaOverride:
-    """Give a team rules of its own on a split, in place of any it had. `actor` None is the command line.
+    """Give a team its own rules on a split. `actor` None is the command line.
 
-    Raises `NotMaintainer`, `Refused` for rules that make no sense, and `Team.DoesNotExist` if the team has
-    just ended.
+    Raises `NotMaintainer`, `Refused`, and `Team.DoesNotExist` if the team has just ended.
     """
     require_maintainer(actor, to="change the quotas of a team")
     rules = {
@@ -321,7 +308,7 @@ def override(
 
 
 def end_override(*, row: QuotaOverride, actor: User | None, reason: str = "") -> None:
-    """Let the split's rules hold for the team again. Raises `NotMaintainer`."""
+    """Remove a team's own rules. Raises `NotMaintainer`."""
     require_maintainer(actor, to="change the quotas of a team")
     with transaction.atomic():
         row.delete()
