@@ -1,4 +1,1 @@
-"""Queue: an evaluation from queued to scored; workers claim, lease and decide it.
-
-The database is the queue.
-"""
+"""Queue: workers claim, lease and decide queued evaluations. The database is the queue."""

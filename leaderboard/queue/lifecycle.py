@@ -1,4 +1,4 @@
-"""The life of an evaluation. Nothing else in the system writes a status.
+"""The life of an evaluation; no other module writes a status.
 
     QUEUED -> RUNNING -> SCORED           scores, report and status in one transaction
                       -> REJECTED         the file is at fault
@@ -8,9 +8,8 @@
     QUEUED | RUNNING  -> CANCELLED        by its team
     SYSTEM_ERROR      -> QUEUED           retried by a maintainer
 
-The database is the queue. A worker claims with an attempt number, a lease token and a deadline; renews the
-lease while it works; and finishes by compare-and-set on all three, so the result of a worker that was thought
-dead (a zombie) changes nothing. All times are the database's: `Now()` is evaluated there, never here.
+A worker claims with attempt number, lease token and deadline, renews the lease, and finishes by
+compare-and-set on all three, so a late worker changes nothing. All times are the database's.
 """
 
 import logging
@@ -42,16 +41,16 @@ RESCORE_BATCH, SMALL_BATCH = 100, 25
 
 
 def batch_of(n_waiting: int) -> int:
-    """How many of an edition's waiting evaluations a worker takes at once."""
+    """Return how many of an edition's waiting evaluations a worker takes at once."""
     return min(RESCORE_BATCH, max(SMALL_BATCH, -(-n_waiting // 2)))
 
 
 class LostRace(Exception):
-    """Another worker decided this evaluation meanwhile; what was computed here is discarded."""
+    """Another worker decided this evaluation meanwhile."""
 
 
 class Strike(Enum):
-    """Why a run came to nothing."""
+    """Why a run failed."""
 
     POISON = "POISON"  # the process died or overran on this very file
     INFRASTRUCTURE = "INFRASTRUCTURE"  # the worker, the database or the disk failed; the file may be innocent
@@ -59,7 +58,7 @@ class Strike(Enum):
 
 @dataclass(frozen=True)
 class Lease:
-    """The right to decide one evaluation: valid while the row still names this attempt and token."""
+    """The right to decide one evaluation, while the row names this attempt and token."""
 
     evaluation_id: uuid.UUID
     attempt: int
@@ -68,9 +67,9 @@ class Lease:
 
 @dataclass(frozen=True)
 class RunResult:
-    """The outcome of a run, ready to be written.
+    """The outcome of a run.
 
-    `scores` maps (metric, TTC range) to a published value; `problems` is the list shown to the submitter.
+    `scores` maps (metric, TTC range) to a published value; `problems` is shown to the submitter.
     """
 
     status: Status
@@ -87,7 +86,7 @@ class RunResult:
 def enqueue(
     *, submission: Submission, edition: Edition, priority: int = Evaluation.PRIORITY_LIVE
 ) -> Evaluation:
-    """Queue a submission for an edition, once: asked again, the first evaluation is the answer.
+    """Queue a submission for an edition, once. Returns the evaluation, which may exist already.
 
     Must run inside the transaction that makes the submission; the nudge follows its commit.
     """
@@ -103,7 +102,6 @@ def enqueue(
 
 
 def _announce(evaluation: Evaluation) -> None:
-    """Say that it waits: in the log, and to the workers."""
     with structlog.contextvars.bound_contextvars(
         submission_id=str(evaluation.submission_id), evaluation_id=str(evaluation.pk)
     ):
@@ -112,9 +110,9 @@ def _announce(evaluation: Evaluation) -> None:
 
 
 def enqueue_many(*, submission_ids: Sequence[uuid.UUID], edition: Edition) -> None:
-    """Queue many submissions for an edition's re-scoring, each once; the workers hear of every batch.
+    """Queue many submissions for an edition's re-scoring, each once.
 
-    Must run inside the transaction that holds the split; the nudges follow its commit.
+    Must run inside the transaction that has locked the split; the nudges follow its commit.
     """
     Evaluation.objects.bulk_create(
         [
@@ -148,9 +146,8 @@ def claim(
 ) -> list[Lease]:
     """Take up to `limit` evaluations that are queued and due, the most urgent and oldest first.
 
-    With `readable_truths`, only those whose ground truth is among these digests: what this worker can score.
-    If the first is one of an edition's re-scoring, with `in_batches` some more of that edition's. Two workers
-    never get the same one.
+    `readable_truths` are the digests that this worker can score. With `in_batches`, some more of the edition
+    if the first is a re-scoring. Two workers never get the same one.
     """
     token = uuid.uuid4()
     with transaction.atomic():
@@ -180,7 +177,6 @@ def claim(
 
 
 def _leased_row(lease: Lease) -> QuerySet[Evaluation]:
-    """The row, if it is still this lease's to decide."""
     return Evaluation.objects.filter(
         pk=lease.evaluation_id, status=Status.RUNNING, attempt=lease.attempt, lease_token=lease.token
     )
@@ -197,10 +193,10 @@ def heartbeat(lease: Lease, *, lease_s: float) -> bool:
 
 
 def finalise(lease: Lease, outcome: RunResult) -> bool:
-    """Write the outcome: status, scores, report and audit row, all or nothing.
+    """Write status, scores, report and audit row, all or nothing.
 
-    Returns True if this call wrote it, False if an earlier call of the same lease had (its COMMIT succeeded
-    and the answer was lost). Raises `LostRace` if the lease is no longer valid: nothing is written then.
+    Returns False if an earlier call of the same lease wrote it (the answer to its COMMIT was lost).
+    Raises `LostRace` if the lease is no longer valid.
     """
     if finalise_many([(lease, outcome)]):
         return True
@@ -214,8 +210,7 @@ def finalise(lease: Lease, outcome: RunResult) -> bool:
 def finalise_many(outcomes: Sequence[tuple[Lease, RunResult]]) -> set[uuid.UUID]:
     """Write many outcomes in one transaction. Returns the evaluations that were written.
 
-    Those whose lease is no longer valid are left alone: another worker decides them, or this one had
-    already and lost the answer.
+    Others had a lease that is no longer valid.
     """
     for _, outcome in outcomes:
         if outcome.status not in (Status.SCORED, Status.REJECTED):
@@ -251,7 +246,6 @@ def finalise_many(outcomes: Sequence[tuple[Lease, RunResult]]) -> set[uuid.UUID]
 
 
 def _locked(leases: Sequence[Lease]) -> set[uuid.UUID]:
-    """The evaluations that are still these leases' to decide, locked until the transaction ends."""
     valid = {(lease.evaluation_id, lease.attempt, lease.token) for lease in leases}
     ids = [lease.evaluation_id for lease in leases]
     rows = Evaluation.objects.select_for_update(no_key=True).filter(pk__in=ids, status=Status.RUNNING)
@@ -263,10 +257,9 @@ def _locked(leases: Sequence[Lease]) -> set[uuid.UUID]:
 def fail_attempt(
     lease: Lease, *, strike: Strike, reason: str, rng: random.Random, is_last: bool = False
 ) -> Status:
-    """End a run that came to nothing, with a strike. Returns the state it left: QUEUED or SYSTEM_ERROR.
+    """End a failed run with a strike. Returns the new state, QUEUED or SYSTEM_ERROR.
 
-    With `is_last` there is no other try before a maintainer asks for one. Raises `LostRace` if the lease is
-    no longer valid.
+    `is_last` gives up at once. Raises `LostRace` if the lease is no longer valid.
     """
     with transaction.atomic():
         evaluation = _leased_row(lease).select_for_update(no_key=True).first()
@@ -276,10 +269,7 @@ def fail_attempt(
 
 
 def release(leases: Sequence[Lease]) -> int:
-    """Queue again what was claimed and never begun, without a strike. Returns how many that were.
-
-    Leases that are no longer valid are left alone.
-    """
+    """Queue again what was claimed and never begun, without a strike. Returns how many."""
     with transaction.atomic():
         valid_ids = _locked(leases)
         running = Evaluation.objects.filter(pk__in=valid_ids, status=Status.RUNNING)
@@ -290,10 +280,10 @@ def release(leases: Sequence[Lease]) -> int:
 
 
 def release_expired(*, rng: random.Random) -> int:
-    """Take back what dead workers hold. Returns how many were taken back.
+    """Take back the evaluations of dead workers. Returns how many.
 
-    A worker that renewed its lease up to the deadline overran on this file: poison. One whose lease ran out
-    earlier vanished: infrastructure. What the clock says now is no evidence, since a sweep may come late.
+    A worker that renewed up to the deadline overran on this file: poison. One whose lease ran out earlier
+    vanished: infrastructure. The time now proves nothing, since a sweep may come late.
     """
     rows = Evaluation.objects.filter(status=Status.RUNNING, leased_until__lt=Now())
     # Asked first: every worker looks every few seconds, and there is hardly ever one.
@@ -319,7 +309,7 @@ def release_expired(*, rng: random.Random) -> int:
 def _strike(
     evaluation: Evaluation, *, strike: Strike, reason: str, rng: random.Random, is_last: bool = False
 ) -> Status:
-    """Count a strike against a locked RUNNING row and send it back, or give up on it."""
+    """Count a strike against a locked RUNNING row; queue it again, or give up."""
     n_poison = evaluation.n_poison_strikes + (strike is Strike.POISON)
     n_infrastructure = evaluation.n_infrastructure_strikes + (strike is Strike.INFRASTRUCTURE)
     exhausted = n_poison >= MAX_POISON_STRIKES or n_infrastructure >= MAX_INFRASTRUCTURE_STRIKES
@@ -360,12 +350,12 @@ def _strike(
 
 
 def cancel_edition(*, edition: Edition) -> int:
-    """Cancel what is not decided yet in an edition that was given up. Returns how many that were."""
+    """Cancel what is undecided in an edition that was given up. Returns how many."""
     return _cancel(Evaluation.objects.filter(edition=edition))
 
 
 def cancel(*, submission: Submission, actor: User | None) -> int:
-    """Cancel what is not decided yet of a submission. Returns how many evaluations that were."""
+    """Cancel the undecided evaluations of a submission. Returns how many."""
     with transaction.atomic():
         n_cancelled = _cancel(Evaluation.objects.filter(submission=submission))
         if n_cancelled:

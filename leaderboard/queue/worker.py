@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 
 class TruthDamaged(Exception):
-    """What the private directory has under this digest is not what was imported."""
+    """The private directory has other values than were imported under this digest."""
 
 
 # The store, the disk, the private directory or the child's start failed: another try may well succeed.
@@ -58,10 +58,7 @@ MAX_STORED_PROBLEMS = 100
 
 
 def run_next(*, rng: random.Random) -> bool:
-    """Claim what is most urgent and decide it: one live submission, or a batch of an edition's re-scoring.
-
-    False: nothing was waiting.
-    """
+    """Claim and decide the most urgent submission, or a batch of a re-scoring. False: nothing waits."""
     claimed_s = time.monotonic()
     leases = _claimed()
     if not leases:
@@ -80,7 +77,6 @@ def run_next(*, rng: random.Random) -> bool:
 
 
 def _claimed() -> list[Lease]:
-    """What this worker gets to decide."""
     # Asked first where a claim is a write even of no row, for which SQLite lets nobody else write.
     if connection.vendor == "sqlite" and not Evaluation.objects.due().exists():
         return []
@@ -93,7 +89,7 @@ def _claimed() -> list[Lease]:
 
 
 def _release(waiting: deque[Lease]) -> None:
-    """Give others what was claimed with a batch and would run out of its lease before it is begun."""
+    # A lease of a batch would run out before it is begun.
     if waiting:
         lifecycle.release(tuple(waiting))
         waiting.clear()
@@ -108,7 +104,7 @@ def _evaluations(leases: Sequence[Lease]) -> list[Evaluation]:
 def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
     """Score a batch of an edition from the values that were kept when their files were first read.
 
-    Returns the leases that need their file read again: without such values, or rejected by the protocol.
+    Returns the leases whose file must be read again: without such values, or rejected by the protocol.
     """
     sent, warned = _retry_on_disconnect(lambda: _sent(leases, edition))
     try:
@@ -153,10 +149,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
 def _sent(
     leases: Sequence[Lease], edition: Edition
 ) -> tuple[dict[uuid.UUID, SentFile], dict[uuid.UUID, list[FileWarning]]]:
-    """The files of these evaluations, and the warnings of those that were scored with this manifest before.
-
-    Warnings come of a file and its manifest alone; to find them takes longer than to score the file.
-    """
+    """Return the files of these evaluations, and known warnings: to find them takes longer than to score."""
     evaluation_of: dict[uuid.UUID, uuid.UUID] = {}
     sent: dict[uuid.UUID, SentFile] = {}
     rows = Evaluation.objects.filter(pk__in=[lease.evaluation_id for lease in leases])
@@ -183,11 +176,10 @@ def run(
     waiting: deque[Lease] | None = None,
     evaluation: Evaluation | None = None,
 ) -> None:
-    """Decide one claimed evaluation. Whatever happens, the lease ends: decided, given back, or lost.
+    """Decide one claimed evaluation; the lease always ends: decided, given back, or lost.
 
-    `waiting` are leases of this worker that are not begun: they are handed back if this run takes long.
-    `evaluation` is the row, if it was read since it was claimed. Only the loss of the database is raised; the
-    lease then runs out by itself.
+    `waiting` are further leases, handed back if this run takes long. `evaluation` is the row, if it was read
+    after the claim. Raises only the loss of the database; the lease then runs out.
     """
     waiting = deque() if waiting is None else waiting
     if evaluation is None:
@@ -224,10 +216,7 @@ def run(
 
 
 class Heartbeat:
-    """The heartbeat of one run.
-
-    A database that does not answer says neither. A run with a heartbeat keeps nothing waiting behind it.
-    """
+    """The heartbeat of one run; a lost database is no reason to stop."""
 
     def __init__(self, lease: Lease, *, waiting: deque[Lease], lease_s: float, wall_s: float) -> None:
         self._lease = lease
@@ -249,7 +238,6 @@ class Heartbeat:
 
 
 def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> RunResult:
-    """Read, check and score one file. A pure function of its bytes, its manifest and the edition."""
     edition, file = evaluation.edition, evaluation.submission.sent_file
     scorer = _scorer(edition)
     try:
@@ -262,7 +250,6 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> RunRes
 
 
 def _scorer(edition: Edition) -> Scorer:
-    """Made of the edition's values. Raises `OSError` or `TruthDamaged`: no submission is to blame."""
     try:
         return recording_sums.scorer(edition.ground_truth_id, edition.protocol)
     except Rejected as fault:
@@ -270,15 +257,15 @@ def _scorer(edition: Edition) -> Scorer:
 
 
 def _in_words(fault: Exception) -> str:
-    """What happened, for maintainers. Ours are sentences already; a library's needs its name."""
+    # Our own exceptions are sentences already; a library's needs its name.
     ours = (child.ChildDied, child.ChildNotReady, child.LeaseLost, TruthDamaged)
     return str(fault) if isinstance(fault, ours) else f"{type(fault).__name__}: {fault}"
 
 
 def scored(report: Report, *, decimals: int, warnings: Sequence[FileWarning] = ()) -> RunResult:
-    """A report as its edition publishes it: values with `decimals` decimals, counts, and nothing finer.
+    """Round a report as its edition publishes it: values, counts, and nothing finer.
 
-    `warnings` are those that file and manifest give: others would tell of hidden values.
+    `warnings` come from file and manifest alone: others would tell of hidden values.
     """
     values = {}
     for ttc_range, scores in report.scores.items():
@@ -302,7 +289,7 @@ def scored(report: Report, *, decimals: int, warnings: Sequence[FileWarning] = (
 
 
 def rejection(rejected: Rejected) -> RunResult:
-    """The outcome for a file that is at fault."""
+    """Make the outcome for a file that is at fault."""
     problems = [
         {"code": problem.code, "message": problem.message, "where": problem.where}
         for problem in rejected.problems[:MAX_STORED_PROBLEMS]
@@ -322,11 +309,7 @@ def _fail_attempt(
 
 
 def _retry_on_disconnect(ask: Callable[[], T]) -> T:
-    """Ask the database, again after a lost connection: questions and compare-and-set may be repeated.
-
-    Raises what the question raises, or the database's error when it stays away; the lease then runs out and
-    the work is done anew.
-    """
+    """Query the database, again after a lost connection: queries and compare-and-set may be repeated."""
     for pause_s in PAUSES_S:
         try:
             return ask()

@@ -1,7 +1,6 @@
 """Untrusted bytes are parsed in a limited child process, without credentials, files or sockets.
 
-If it dies once it has begun to read the file, that is the file's doing: the worker itself lives on. Nothing
-that it writes is believed but what a file may say of itself; any other answer counts as the child's death.
+If it dies after it began to read, the file is to blame. Answers that no file could give count as its death.
 """
 
 import json
@@ -44,11 +43,11 @@ class ChildOutOfTime(ChildDied):
 
 
 class ChildNotReady(Exception):
-    """The child could not begin, or lost the process that had started it: not the file's doing."""
+    """The child could not begin, or lost its parent: the file is not to blame."""
 
 
 class LeaseLost(Exception):
-    """The work was taken away, or its time was up, while the child ran; the child has been ended."""
+    """The lease was lost while the child ran; the child has been ended."""
 
 
 def read_predictions(
@@ -62,9 +61,8 @@ def read_predictions(
 ) -> Predictions:
     """Parse and align the prediction file with this digest in a child process.
 
-    `heartbeat` is called every `heartbeat_s` seconds while the child works; when it says False the child is
-    ended. Raises `evaluator.Rejected` if the file is at fault, `ChildDied` also for an answer that no file
-    gives, `ChildNotReady`, or `LeaseLost`; `OSError` if no child could be started.
+    Ends the child when `heartbeat`, called every `heartbeat_s` seconds, returns False. Raises
+    `evaluator.Rejected`, `ChildDied`, `ChildNotReady`, `LeaseLost`; `OSError` if no child could be started.
     """
     _say_what_is_missing()
     request = {
@@ -89,7 +87,6 @@ def read_predictions(
 
 @cache
 def _say_what_is_missing() -> None:
-    """Warn, once for each process, that children run with their limits alone."""
     why = system_calls.why_unavailable()
     if why is not None:
         log.warning("readers_without_a_filter_of_system_calls", reason=why)
@@ -103,10 +100,7 @@ def _forked(
     heartbeat: Callable[[], bool],
     heartbeat_s: float,
 ) -> Answer:
-    """What a child says that is forked for the file.
-
-    A server that has ended since the last file is replaced, once.
-    """
+    """Read with a forked child; replace once a server that has ended since the last file."""
     for _ in range(2):
         server = fork_server.server_of_this_thread(python_path=settings.BASE_DIR)
         is_new = not server.has_served
@@ -136,7 +130,7 @@ def _spawned(
     heartbeat: Callable[[], bool],
     heartbeat_s: float,
 ) -> Answer:
-    """What a child says that is started for the file, where there is no `fork` to be trusted."""
+    """Read with a new process, where `fork` cannot be trusted."""
     command = [sys.executable, "-m", "evaluator.predictions.reader", *map(str, request.values())]
     child = subprocess.Popen(  # noqa: S603 - our own interpreter and module, nothing of the file
         command,
@@ -156,7 +150,7 @@ def _spawned(
 
 
 def _at_most(pipe: IO[bytes] | None, max_bytes: int) -> bytes:
-    """All that comes through the pipe. Raises `TooMuch` above `max_bytes`; the pipe is closed then."""
+    """Read the pipe to its end. Closes it and raises `TooMuch` above `max_bytes`."""
     if pipe is None:
         raise RuntimeError("the reading process was started without pipes")
     with pipe:
@@ -169,7 +163,6 @@ def _at_most(pipe: IO[bytes] | None, max_bytes: int) -> bytes:
 def _await_end(
     child: "subprocess.Popen[bytes]", *, heartbeat: Callable[[], bool], heartbeat_s: float
 ) -> None:
-    """Wait until the child ends, with a heartbeat meanwhile. Raises `LeaseLost`."""
     while True:
         try:
             child.wait(timeout=heartbeat_s)
@@ -181,7 +174,6 @@ def _await_end(
 
 
 def _cause(returncode: int, complaint: bytes) -> str:
-    """Why the child died, in words."""
     if returncode == EXIT_OUT_OF_MEMORY:
         return f"needed more than {settings.CHILD_MEMORY_BYTES // 1_000_000} MB of memory"
     if returncode < 0:
@@ -191,7 +183,7 @@ def _cause(returncode: int, complaint: bytes) -> str:
 
 
 def _decoded(answer: bytes, *, manifest: Manifest, digest: str) -> Predictions:
-    """The child's answer as predictions. Raises `evaluator.Rejected`, or `ChildDied` if it makes no sense."""
+    """Decode the child's answer. Raises `evaluator.Rejected`, or `ChildDied` if it makes no sense."""
     line, _, body = answer.partition(b"\n")
     header = _header(line)
     if header.get("verdict") == "rejected":

@@ -1,7 +1,7 @@
-"""A submission's values in the order of an edition's ground truth: saved before, or read from the file.
+"""A submission's values in the order of an edition's ground truth: saved, or read from the file.
 
-A file is read with the manifest that was public when it came. From there its values go by natural keys to the
-manifest of the edition, so only a correction that adds sequences asks for another file.
+A file is read with the manifest of its time; natural keys map its values to the edition's manifest, so only a
+correction that adds sequences needs another file.
 """
 
 from collections.abc import Callable
@@ -22,10 +22,10 @@ log = structlog.get_logger(__name__)
 
 
 def saved(file: SentFile, edition: Edition) -> Predictions | None:
-    """The values that were kept when the file was first read; None if they are not all there.
+    """Return the saved values, if they are complete.
 
-    Raises `evaluator.Rejected` if the edition has sequences that the file's manifest did not have, and
-    `OSError` if the private directory or the store does not answer.
+    Raises `evaluator.Rejected` if the edition has further sequences, and `OSError` if directory or store do
+    not answer.
     """
     manifest = truth_values.load(edition.ground_truth_id).manifest
     n_sent, order, missing = _sent_order(file.manifest_digest, edition.ground_truth_id)
@@ -40,10 +40,9 @@ def saved(file: SentFile, edition: Edition) -> Predictions | None:
 
 @lru_cache(maxsize=16)
 def _sent_order(own_digest: str, truth_digest: str) -> tuple[int, Rows | None, Rows]:
-    """How many values a file for this manifest has, and where among them, in ascending anno_id, each is.
+    """Return the length of a file for this manifest, and the index of each value, (n,) in truth order.
 
-    (n,) in the order of the ground truth; None where that is the order of the values. And the rows of the
-    ground truth that the file's manifest does not have.
+    None is the same order. The third are the rows of the truth that the manifest lacks.
     """
     manifest = truth_values.load(truth_digest).manifest
     own = manifest if manifest.digest == own_digest else manifests.load(own_digest)
@@ -56,10 +55,10 @@ def _sent_order(own_digest: str, truth_digest: str) -> tuple[int, Rows | None, R
 
 
 def read(file: SentFile, edition: Edition, *, heartbeat: Callable[[], bool] = lambda: True) -> Predictions:
-    """The values from the bytes of the file, which are kept for the next time.
+    """Read the values from the file, and save them.
 
-    Raises `evaluator.Rejected` if the file is at fault or lacks sequences of the edition, `OSError` if the
-    store, the disk or the private directory does not answer, and what `child.read_predictions` raises.
+    Raises `evaluator.Rejected`, `OSError` if store, disk or private directory do not answer, and what
+    `child.read_predictions` raises.
     """
     manifest = truth_values.load(edition.ground_truth_id).manifest
     is_own = manifest.digest == file.manifest_digest
@@ -86,5 +85,5 @@ def read(file: SentFile, edition: Edition, *, heartbeat: Callable[[], bool] = la
 
 
 def load(file: SentFile, edition: Edition) -> Predictions:
-    """The values as they were kept, or from the file itself. Raises as `read` does."""
+    """Return the saved values, or read the file. Raises as `read` does."""
     return saved(file, edition) or read(file, edition)

@@ -1,8 +1,4 @@
-"""The worker's side of the process that forks a reader for each prediction file.
-
-Each thread that scores has one such process, started at its first file, replaced when it has ended. It ends
-with the thread, or with the worker, however that ends.
-"""
+"""The worker's side of the process that forks a reader for each prediction file, one for each thread."""
 
 import fcntl
 import json
@@ -30,7 +26,7 @@ _SET_PIPE_SIZE = 1031  # F_SETPIPE_SZ, whose name `fcntl` has on Linux only
 
 
 class ServerEnded(Exception):
-    """The process that forks readers has ended, and with it the reader; `began` if that had seen the file."""
+    """The fork server has ended, and its reader with it; `began` if the reader had seen the file."""
 
     def __init__(self, *, began: bool) -> None:
         super().__init__()
@@ -38,11 +34,11 @@ class ServerEnded(Exception):
 
 
 class NotStarted(Exception):
-    """The process that forks readers is well and could not make one; the message says why."""
+    """The fork server could not start a reader."""
 
 
 class Interrupted(Exception):
-    """The heartbeat said no; the reader has been ended."""
+    """The heartbeat returned False; the reader has been ended."""
 
 
 class TooMuch(Exception):
@@ -51,7 +47,7 @@ class TooMuch(Exception):
 
 @dataclass(frozen=True)
 class Answer:
-    """What a reader wrote until it ended; `returncode` is negative for a signal."""
+    """The output of a reader that ended; `returncode` is negative for a signal."""
 
     returncode: int
     output: bytes
@@ -59,7 +55,7 @@ class Answer:
 
 
 def environment(*, python_path: Path) -> dict[str, str]:
-    """What a process that reads files is given: no credentials, and one thread."""
+    """Return the environment of a process that reads files: no credentials, one thread."""
     return {
         "PATH": os.defpath,
         "PYTHONPATH": str(python_path),
@@ -69,7 +65,7 @@ def environment(*, python_path: Path) -> dict[str, str]:
 
 
 class ForkServer:
-    """A process that forks readers, from its start to its end."""
+    """A process that forks readers."""
 
     def __init__(self, *, python_path: Path) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -92,7 +88,7 @@ class ForkServer:
 
     @property
     def is_ours(self) -> bool:
-        """Whether it runs, and this process started it: a copy made by `fork` must not share it."""
+        # A copy made by `fork` must not share it.
         return self.close.alive and self._owner == os.getpid()
 
     def read(
@@ -104,9 +100,9 @@ class ForkServer:
         heartbeat: Callable[[], bool],
         heartbeat_s: float,
     ) -> Answer:
-        """Have one file read by a process of its own, with a heartbeat every `heartbeat_s` seconds.
+        """Read one file in a process of its own, with a heartbeat every `heartbeat_s` seconds.
 
-        Raises `NotStarted`, and with this server closed `ServerEnded`, `Interrupted`, or `TooMuch`.
+        Raises `NotStarted`; `ServerEnded`, `Interrupted` or `TooMuch`, which close this server.
         """
         reading = _Reading(max_bytes=max_bytes)
         try:
@@ -130,7 +126,6 @@ class ForkServer:
     def _begin(
         self, source: IO[bytes], request: dict[str, object], reading: "_Reading", *, stack: ExitStack
     ) -> None:
-        """Send the request, and keep this process's ends of the pipes."""
         stack.enter_context(reading)
         theirs = [source.fileno()]
         with ExitStack() as sent:
@@ -148,10 +143,7 @@ class ForkServer:
 
 
 class _Reading:
-    """One file on its way: what has come from the reader, and from the server about it.
-
-    As a context it ends the reader that has not ended by itself.
-    """
+    """The state of one file while it is read. As a context it ends the reader that has not ended."""
 
     def __init__(self, *, max_bytes: int) -> None:
         self.output = bytearray()
@@ -177,27 +169,24 @@ class _Reading:
             os.close(self._process)
 
     def follow(self, pipe: int, into: bytearray) -> None:
-        """Receive what comes through the pipe, and close it at its end."""
+        """Receive from the pipe, and close it at its end."""
         self._selector.register(pipe, selectors.EVENT_READ, into)
         self._n_open_pipes += 1
 
     def listen(self, server: socket.socket) -> None:
-        """Receive what the server says of the reader."""
         self._selector.register(server, selectors.EVENT_READ, server)
 
     @property
     def is_complete(self) -> bool:
-        """Whether the reader has ended, and all that it wrote is here."""
         return self._returncode is not None and not self._n_open_pipes
 
     def answer(self) -> Answer:
-        """Of a reader that has ended."""
         if self._returncode is None:
             raise ValueError("the reader has not ended")
         return Answer(self._returncode, bytes(self.output), bytes(self.complaint))
 
     def receive(self, *, timeout_s: float) -> None:
-        """What there is within that time. Raises `NotStarted`, `ServerEnded` or `TooMuch`."""
+        """Receive what comes within that time. Raises `NotStarted`, `ServerEnded` or `TooMuch`."""
         for key, _ in self._selector.select(timeout_s):
             if isinstance(key.data, bytearray):
                 self._read(key.fd, key.data)
@@ -230,13 +219,13 @@ class _Reading:
 
 
 def _widen(pipe: int) -> None:
-    """Let an answer pass at once where it can; else the reader waits for us after each 64 KB."""
+    # Else the reader waits for us after each 64 KB.
     with suppress(OSError):
         fcntl.fcntl(pipe, _SET_PIPE_SIZE, _CHUNK_BYTES)
 
 
 def _end(server: socket.socket, pid: int, owner: int) -> None:
-    """End the process; its reader ends with it. In a copy of the owner that `fork` made, only let go."""
+    """End the server and its reader. In a forked copy of the owner, only let go."""
     server.close()
     if os.getpid() == owner:
         with suppress(ProcessLookupError, ChildProcessError):
@@ -245,8 +234,6 @@ def _end(server: socket.socket, pid: int, owner: int) -> None:
 
 
 class _Servers(threading.local):
-    """The server of each thread."""
-
     server: ForkServer | None = None
 
 
@@ -254,7 +241,7 @@ _SERVERS = _Servers()
 
 
 def server_of_this_thread(*, python_path: Path) -> ForkServer:
-    """The one that this thread used last, or a new one. Raises `OSError` if none can be started."""
+    """Return this thread's server, new if need be. Raises `OSError` if none can be started."""
     server = _SERVERS.server
     if server is None or not server.is_ours:
         server = _SERVERS.server = ForkServer(python_path=python_path)

@@ -29,10 +29,7 @@ MAX_RECORDINGS = 20
 
 
 def for_submission(*, submission: Submission, viewer: User | AnonymousUser) -> Analysis | None:
-    """The analysis of a submission for its own team (and maintainers).
-
-    None for everybody else, on a hidden split, and until a worker has made it.
-    """
+    """Return the analysis of a submission for its team and maintainers, if there is one to be shown."""
     split = submission.split
     if split.is_hidden or not Submission.objects.visible_to(viewer).filter(pk=submission.pk).exists():
         return None
@@ -45,7 +42,7 @@ def for_submission(*, submission: Submission, viewer: User | AnonymousUser) -> A
 
 
 def missing(*, readable_truths: Collection[str]) -> QuerySet[Evaluation]:
-    """Entries on the board of an open split without an analysis, the newest first."""
+    """Return board entries of open splits without an analysis, newest first."""
     opened = [digest for digest in readable_truths if not hidden_marks.is_marked(digest)]
     boards = Split.objects.filter(is_hidden=False, current_edition__ground_truth__in=opened)
     return (
@@ -61,9 +58,8 @@ def missing(*, readable_truths: Collection[str]) -> QuerySet[Evaluation]:
 
 
 def make(evaluation: Evaluation, *, now: datetime) -> None:
-    """Look closely at one evaluation, and keep what is seen; not if its split was hidden meanwhile.
+    """Compute and save the analysis, unless the split is hidden now or its truth was imported as hidden.
 
-    Nor if its ground truth was imported as a hidden one: then it is a mistake, or worse, to call it open.
     Raises `OSError` if the store or the private directory does not answer.
     """
     if hidden_marks.is_marked(evaluation.edition.ground_truth_id):
@@ -78,7 +74,7 @@ def make(evaluation: Evaluation, *, now: datetime) -> None:
 
 
 def delete_hidden() -> None:
-    """Remove the analyses of splits that were open once and are hidden now."""
+    """Delete the analyses of splits that have become hidden."""
     Analysis.objects.filter(evaluation__edition__split__is_hidden=True).delete()
 
 
@@ -89,21 +85,19 @@ def content_of(
     rules: Protocol,
     unit: str | None = None,
 ) -> dict[str, Any]:
-    """The error analysis of one submission. The points drawn are the same for all submissions. It has
+    """Analyse the errors of one submission; the points drawn are the same for all submissions.
 
-    - `curve`: the mean errors by true time to contact, a list of `{"low_s", "high_s", "n", "mid", …,
-      "intervals"}` in ascending order, one for each bin [low_s, high_s) that has sequences; `intervals` are
-      the 95 % confidence intervals `{"mid": [low, high], …}` of those means that have enough units;
+    - `curve`: mean errors by true TTC, `{"low_s", "high_s", "n", "mid", …, "intervals"}` for each bin
+      [low_s, high_s) with sequences; `intervals` are the 95 % intervals `{"mid": [low, high], …}` of means
+      with enough units;
     - `distribution`: `{"mid": […], …}`, each a list of `{"quantile", "value"}` from 0.05 to 0.99;
-    - `histogram`: a list of `{"low", "high", "n"}` of MiD over 24 equal bins up to its 95 % quantile; the
-      last has `"high": None` and holds all that is larger;
-    - `scatter`: `{"true_s": […], "predicted_s": […]}` of at most 500 sequences drawn at random, the
-      predictions as the protocol truncates them;
-    - `worst`: at most 20 recordings by their mean MiD, the worst first: `{"recording", "n", "mid", …}`;
+    - `histogram`: `{"low", "high", "n"}` of MiD over 24 equal bins up to its 95 % quantile; the last has
+      `"high": None`;
+    - `scatter`: `{"true_s": […], "predicted_s": […]}` of at most 500 random sequences, predictions truncated;
+    - `worst`: at most 20 recordings by mean MiD, worst first: `{"recording", "n", "mid", …}`;
     - `n_sequences` and `n_recordings`.
 
-    Errors stand under the names of the protocol's metrics. They are rounded as published values are, times to
-    a thousandth of a second.
+    Errors have the names of the protocol's metrics and are rounded as published; times to a millisecond.
     """
     report = evaluator.evaluate(predictions, truth, protocol=rules, keep_sequences=True)
     assert report.sequences is not None and report.details is not None  # noqa: S101, PT018 - asked for

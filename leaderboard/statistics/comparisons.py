@@ -1,8 +1,6 @@
-"""Comparisons: two to five entries of an edition side by side, each pair with its difference, interval and p.
+"""Comparisons of two to five entries of an edition: each pair with its difference, interval and p.
 
-A reader asks, and is answered at once with what is known. What is not known yet is noted as a row, and a
-worker computes it: recordings are compared, and only workers have their values. Asked again a moment later,
-the answer is complete.
+A reader gets what is known at once. Unknown pairs are queued: only workers have the values of recordings.
 """
 
 import itertools
@@ -32,22 +30,19 @@ WITHHELD = "withheld"
 
 
 class BadComparison(Exception):
-    """The comparison that was asked for makes no sense; the text says what was found and what is expected.
-
-    `code` is stable: bad-comparison, unknown-method, not-on-the-board.
-    """
+    """The comparison makes no sense. `code` is bad-comparison, unknown-method or not-on-the-board."""
 
     code = "bad-comparison"
 
 
 class UnknownMethod(BadComparison):
-    """A method that does not exist or that this reader may not see; the answer is the same."""
+    """The method does not exist or this reader may not see it; the answer is the same."""
 
     code = "unknown-method"
 
 
 def method_id(text: str) -> UUID:
-    """The method that an address names. Raises `UnknownMethod`."""
+    """Parse the id of a method. Raises `UnknownMethod`."""
     try:
         return UUID(text)
     except ValueError:
@@ -66,8 +61,7 @@ class NotOnTheBoard(BadComparison):
 class Pair:
     """Two entries and their differences by score name: None until a worker has computed them.
 
-    A column without sequences is not in `differences`. `withheld` says why they have neither interval nor p
-    where nobody is told those; it is empty otherwise.
+    A column without sequences is missing. `withheld` says why there is neither interval nor p, if so.
     """
 
     first: Entry
@@ -76,7 +70,7 @@ class Pair:
     withheld: str = ""
 
     def sentence(self, name: str = PRIMARY) -> str:
-        """What the difference in one column means, in words; empty while it is not known."""
+        """Word the difference in one column; empty while it is not known."""
         if self.differences is None or name not in self.differences:
             return ""
         first, second = self.first.method, self.second.method
@@ -90,21 +84,20 @@ class Pair:
         )
 
     def influence(self) -> str:
-        """On how few recordings the difference in MiD rests; empty where that is withheld."""
+        """Say on how few recordings the difference in MiD rests; empty where that is withheld."""
         gap = (self.differences or {}).get(PRIMARY)
         return sentences.influence(self.first.method, self.second.method, difference=gap) if gap else ""
 
     def others(self) -> str:
-        """How many columns besides overall MiD differ significantly."""
+        """Say how many columns besides overall MiD differ significantly."""
         return sentences.others(self.differences or {})
 
 
 @dataclass(frozen=True)
 class Compared:
-    """The answer: entries in the order that was asked for, all pairs of them, and whether all is computed.
+    """A comparison: entries in the requested order, all pairs, and whether all is computed.
 
-    An entry is the method's row of the board as this reader sees it, pseudonym, values and intervals
-    included. `reason` says why there are no intervals where there are none, and is empty otherwise.
+    Entries are rows of the board as this reader sees them. `reason` says why there are no intervals, if so.
     """
 
     split: Split
@@ -124,13 +117,11 @@ def compare(
     edition: Edition | None = None,
     address: str = "",
 ) -> Compared:
-    """Compare two to five methods of one board: the published edition's unless another is named.
+    """Compare two to five methods on the published board or a named edition.
 
-    Pairs that no worker has compared yet have `differences` None; they are asked for, and the workers told.
-    Of pairs that `disclosure.why_withheld` names, there is the difference of the published values alone.
-    What a visitor asks for is counted by the `address` that they ask from. Raises `BadComparison` for another
-    number of methods or the same one twice, `UnknownMethod` for one that the viewer may not see,
-    `NotOnTheBoard` for one without a value there, `questions.AskedTooOften`.
+    Queues pairs that are not computed; they have `differences` None. Pairs that `disclosure.why_withheld`
+    names have only the difference of the published values. Raises `BadComparison`, `UnknownMethod`,
+    `NotOnTheBoard`, and `questions.AskedTooOften` by account or `address`.
     """
     board = snapshots.board(split=split, edition=edition, viewer=viewer)
     if board.edition is None:
@@ -155,10 +146,9 @@ def compare(
 
 
 def of_first(*, board: listing.Board) -> tuple[Pair, ...]:
-    """All pairs of the first rows of a board that everybody sees, each with the better rank first.
+    """Return all pairs of the first public rows of a board, the better rank first; queue unknown ones last.
 
-    What is not known yet is noted, for workers to compute after all that somebody waits for. Empty for a
-    board of another time, and where there are too few recordings to compare anything.
+    Empty for a board of the past, and with too few recordings.
     """
     if board.edition is None or board.at is not None or confidence.why_no_interval(board.edition):
         return ()
@@ -175,14 +165,13 @@ def of_first(*, board: listing.Board) -> tuple[Pair, ...]:
 
 
 def neighbours(pairs: Sequence[Pair]) -> list[Pair]:
-    """Of all pairs of some rows, those of two rows that follow each other."""
+    """Return the pairs of two rows that follow each other."""
     firsts = list(dict.fromkeys(pair.first.evaluation_id for pair in pairs))
     is_first = dict.fromkeys(firsts, True)
     return [pair for pair in pairs if is_first.pop(pair.first.evaluation_id, False)]
 
 
 def _chosen(board: listing.Board, methods: Sequence[UUID], viewer: User | AnonymousUser) -> list[Entry]:
-    """The methods' rows, in the order that was asked for."""
     if not MIN_METHODS <= len(methods) <= MAX_METHODS:
         raise BadComparison(
             f"A comparison needs {MIN_METHODS} to {MAX_METHODS} methods; found {len(methods)}."
@@ -199,7 +188,6 @@ def _chosen(board: listing.Board, methods: Sequence[UUID], viewer: User | Anonym
 
 
 def _withheld(edition: Edition, pairs: Sequence[tuple[Entry, Entry]]) -> dict[Key, str]:
-    """Why the interval and p of a pair are withheld, by its key; no other pairs."""
     whys = {_key(pair): disclosure.why_withheld(*pair, edition=edition) for pair in pairs}
     return {key: why for key, why in whys.items() if why}
 
@@ -216,7 +204,7 @@ def _differences_of_values(
 
 
 def _key(pair: tuple[Entry, Entry]) -> Key:
-    """A pair is kept once, under its evaluations in ascending order."""
+    # A pair is kept once, under its evaluations in ascending order.
     first, second = sorted([_evaluation_id(pair[0]), _evaluation_id(pair[1])])
     return first, second
 
@@ -227,7 +215,6 @@ def _evaluation_id(entry: Entry) -> UUID:
 
 
 def _known(edition: Edition, chosen: Sequence[Entry]) -> dict[Key, Comparison]:
-    """What was asked for before, computed or not."""
     ids = [_evaluation_id(entry) for entry in chosen]
     asked = Comparison.objects.filter(edition=edition, first__in=ids, second__in=ids)
     return {(row.first_id, row.second_id): row for row in asked}
@@ -267,9 +254,9 @@ def _parsed(kept: Mapping[str, Any]) -> Difference:
 
 
 def compute(row: Comparison, *, now: datetime) -> None:
-    """Compare the two entries of a row, unit by unit, and write their differences, once.
+    """Compare the two entries of a row, unit by unit, and save their differences, once.
 
-    Raises what `bags.sums_of` raises; the row waits on then.
+    Raises what `recording_sums.sums_of` raises; the row then waits on.
     """
     questions.begin(row, now=now)
     sent = (row.first.submission, row.second.submission)
@@ -286,7 +273,6 @@ def compute(row: Comparison, *, now: datetime) -> None:
 def _differences(
     row: Comparison, one: Mapping[str, float | None], other: Mapping[str, float | None]
 ) -> dict[str, Difference]:
-    """The published difference of each column between these values, with its interval and p."""
     edition = row.edition
     sent = (row.first.submission.sent_file, row.second.submission.sent_file)
     first, second = (recording_sums.unit_sums_of(edition, file=file) for file in sent)

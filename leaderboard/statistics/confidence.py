@@ -1,8 +1,7 @@
-"""Uncertainty of an edition: a confidence interval for every value, a rank range for every rank.
+"""Confidence intervals and rank ranges of an edition (`docs/uncertainty.md`).
 
-Workers make them from sums per unit (day or recording), which never leave their private directory. An
-interval belongs to one evaluation and stays; ranges belong to all entries of a board and are made again when
-those change, which a digest tells. `docs/uncertainty.md` says how and why.
+An interval belongs to one evaluation and stays; rank ranges belong to all entries of a board and are computed
+again when those change, which a digest tells.
 """
 
 import hashlib
@@ -53,7 +52,7 @@ Ranges = dict[str, list[list[int] | None]]
 
 
 class ScoredEntry(NamedTuple):
-    """A scored submission in an edition that its team has not withdrawn."""
+    """A scored, active submission in an edition."""
 
     evaluation_id: UUID
     file: SentFile
@@ -64,10 +63,7 @@ class ScoredEntry(NamedTuple):
 
 
 def generator_of(edition: Edition, *, purpose: str) -> np.random.Generator:
-    """The random numbers of an edition for one purpose: everything that is drawn for it comes from here.
-
-    Raises `OSError` of a hidden split without its secret.
-    """
+    """Return an edition's generator for one purpose. Raises `OSError` without a hidden split's secret."""
     return uncertainty.generator_of(seed_of(edition), purpose=purpose)
 
 
@@ -75,7 +71,7 @@ def generator_of(edition: Edition, *, purpose: str) -> np.random.Generator:
 
 
 def active_entries(edition: Edition) -> list[ScoredEntry]:
-    """The scored, active entries of an edition, private methods included: one query."""
+    """Return the scored, active entries of an edition, private methods included."""
     rows = Score.objects.filter(
         evaluation__edition=edition,
         evaluation__status=Status.SCORED,
@@ -98,7 +94,7 @@ def active_entries(edition: Edition) -> list[ScoredEntry]:
 
 
 def ranked(rows: Sequence[ScoredEntry]) -> list[ScoredEntry]:
-    """What everybody sees ranked: of each shown method its best, the earlier one of two that are as good."""
+    """Return the public entries: the best of each shown method, the earlier of two equal ones."""
     best: dict[UUID, ScoredEntry] = {}
     for row in sorted(rows, key=lambda row: (row.value, row.submitted_at)):
         if row.is_shown:
@@ -107,7 +103,6 @@ def ranked(rows: Sequence[ScoredEntry]) -> list[ScoredEntry]:
 
 
 def _printed(edition: Edition) -> list[tuple[float, ...]]:
-    """The numbers of each row on its board that is quoted from a paper; NaN where it has none."""
     rows = PublishedResult.objects.on_board(edition.split, edition).values_list("scores", flat=True)
     names = edition.rules.score_names
     return [tuple(float(scores.get(name) or "nan") for name in names) for scores in rows]
@@ -115,7 +110,7 @@ def _printed(edition: Edition) -> list[tuple[float, ...]]:
 
 @dataclass(frozen=True)
 class Entries:
-    """The entries of an edition, read once for all that a worker does with them."""
+    """The entries of an edition, read once."""
 
     edition: Edition
     rows: tuple[ScoredEntry, ...]
@@ -123,23 +118,21 @@ class Entries:
 
     @classmethod
     def of(cls, edition: Edition) -> "Entries":
-        """As they are now."""
         return cls(edition, tuple(active_entries(edition)), tuple(_printed(edition)))
 
     @cached_property
     def ranked(self) -> list[ScoredEntry]:
-        """Those that everybody sees ranked."""
         return ranked(self.rows)
 
     @cached_property
     def digest(self) -> str:
-        """The digest of the inputs of intervals and ranges. It depends on private entries: never show it."""
+        """Return the digest of the inputs of inference; private entries count, so never show it."""
         rivals = {row.evaluation_id for row in self.ranked}
         return self._digest([f"{row.evaluation_id} {row.evaluation_id in rivals}" for row in self.rows])
 
     @cached_property
     def ranked_digest(self) -> str:
-        """The digest of the inputs of ranges, public entries only."""
+        """Return the digest of the inputs of ranges, public entries only."""
         return self._digest([str(row.evaluation_id) for row in self.ranked])
 
     def _digest(self, lines: Sequence[str]) -> str:
@@ -149,15 +142,14 @@ class Entries:
 
     @property
     def have_ranges(self) -> bool:
-        """Whether floor and ranges of the edition are there, and made of these entries."""
+        """Tell whether the edition has floor and ranges of these entries."""
         return self.edition.floor is not None and self.edition.inference_digest == self.digest
 
 
 def stale(*, now: datetime, readable_truths: Collection[str]) -> Iterator[Entries]:
-    """The entries of editions whose ranges are out of date, read one edition at a time.
+    """Yield the entries of editions whose ranges are out of date, one edition at a time.
 
-    Only those whose ground truth is among `readable_truths` (digests). An edition in which something is still
-    to be scored waits for `MAX_DELAY`.
+    `readable_truths` are digests. An edition with evaluations still to score waits for `MAX_DELAY`.
     """
     undecided = Evaluation.objects.filter(edition=OuterRef("pk"), status__in=[Status.QUEUED, Status.RUNNING])
     editions = (
@@ -178,9 +170,8 @@ def stale(*, now: datetime, readable_truths: Collection[str]) -> Iterator[Entrie
 
 
 def infer(entries: Entries, *, now: datetime, between: Callable[[], None] = lambda: None) -> bool:
-    """Make what is missing of an edition's intervals and, of other entries, its rank ranges. Whether it did.
+    """Compute missing intervals and, for changed entries, rank ranges. Returns whether anything was written.
 
-    False: they hold already, another worker computes them, or the entries have changed since they were read.
     `between` is called every fraction of a second. Raises what `recording_sums.sums_of` raises.
     """
     if entries.have_ranges or not _claim(entries.edition):
@@ -196,7 +187,7 @@ def infer(entries: Entries, *, now: datetime, between: Callable[[], None] = lamb
 
 
 def _claim(edition: Edition) -> bool:
-    """Let no other worker compute the edition's: of a thousand entries it takes a processor for minutes."""
+    # Of a thousand entries the computation takes a processor for minutes.
     row, _ = EditionRanges.objects.get_or_create(edition=edition)
     is_free = Q(claimed_until=None) | Q(claimed_until__lte=Now())
     ends = clock.after(CLAIM_S)
@@ -204,7 +195,6 @@ def _claim(edition: Edition) -> bool:
 
 
 def _intervals(entries: Entries, *, between: Callable[[], None]) -> list[Score]:
-    """The scores that have no interval yet and can have one, with it."""
     edition = entries.edition
     usable = uncertainty.usable_columns(recording_sums.unit_counts_of(edition))
     column_of = {name: j for j, name in enumerate(edition.rules.score_names)}
@@ -229,7 +219,6 @@ def _intervals(entries: Entries, *, between: Callable[[], None]) -> list[Score]:
 
 
 def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Ranges] | None:
-    """The rank ranges and the digest of what they are made of; None where those that are there hold."""
     edition, rivals, digest = entries.edition, entries.ranked, entries.ranked_digest
     if EditionRanges.objects.filter(edition=edition, digest=digest).exists():
         return None
@@ -253,7 +242,7 @@ def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Rang
 
 
 def _published_values(edition: Edition, wanted: Sequence[UUID]) -> Floats:
-    """The values of these evaluations as they are ranked, (n, columns); NaN where one has none."""
+    """Return the values of these evaluations as they are ranked, (n, columns); NaN where one has none."""
     column_of = {name: j for j, name in enumerate(edition.rules.score_names)}
     row_of = {pk: i for i, pk in enumerate(wanted)}
     values = np.full((len(wanted), len(column_of)), np.nan)
@@ -265,13 +254,12 @@ def _published_values(edition: Edition, wanted: Sequence[UUID]) -> Floats:
 
 
 def _n_effective(edition: Edition) -> dict[str, float]:
-    """The effective number of units of each column, as it is published."""
     degrees = uncertainty.degrees_of(recording_sums.unit_counts_of(edition))
     return {name: cut_off(n) for name, n in zip(edition.rules.score_names, degrees.tolist(), strict=True)}
 
 
 def _quoted(entries: Entries, counts: Floats) -> Quoted | None:
-    """The rows quoted from papers, each value as exact as it was printed: 14.8 is 14.75 to 14.85."""
+    # Each value is as exact as printed: 14.8 is 14.75 to 14.85.
     values = np.array(entries.printed).reshape(-1, len(entries.edition.rules.score_names))
     if not len(values):
         return None
@@ -281,7 +269,7 @@ def _quoted(entries: Entries, counts: Floats) -> Quoted | None:
 
 
 def bootstrap_of(edition: Edition) -> uncertainty.Bootstrap:
-    """The weights of the edition's ground truth. Raises `OSError` without access to its values."""
+    """Return the weights of the edition's ground truth. Raises `OSError` without access to its values."""
     counts = recording_sums.unit_counts_of(edition)
     return _bootstrap(seed_of(edition), counts.tobytes(), counts.shape)
 
@@ -296,8 +284,7 @@ def _write(
 ) -> bool:
     """Write intervals and ranges, all or none, if the entries are still the same.
 
-    They are read for the second time here, with the edition locked: the comparison of compare-and-set. Scores
-    need not be: a score does not change, and only who has the edition locked writes beside it.
+    They are read again with the edition locked: a compare-and-set.
     """
     edition = entries.edition
     shown = {row.evaluation_id for row in entries.rows if row.is_shown}
@@ -330,10 +317,9 @@ def _write(
 
 
 def why_no_interval(edition: Edition) -> str:
-    """Why nothing in this edition has an interval, a rank range or a p-value; "" where some have.
+    """Say why nothing in this edition has an interval, a rank range or a p-value; "" where some have.
 
-    A worker finds out how many units an edition effectively has, and writes it beside the edition; until
-    then only an edition with too few units in all is known to have none.
+    A worker saves the effective number of units; until then only too few units in all is known.
     """
     most = max(edition.n_effective.values(), default=float(edition.unit_count))
     if most >= MIN_DEGREES:

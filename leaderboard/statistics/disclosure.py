@@ -1,10 +1,9 @@
-"""Disclosure: how finely intervals and p-values of hidden splits are published, and for what pairs.
+"""How finely intervals and p-values of hidden splits are published, and for what pairs.
 
-Each number that follows from hidden labels tells of them, and a file can be made to be read through such
-numbers. Of a hidden split the ends of intervals are therefore rounded outwards to about a tenth of their
-width (never finer than values are published), p is told as a class, and only methods that everybody sees by
-name, of different teams, are compared. Everybody gets the same, the teams of the methods as well.
-`docs/security.md` says what each of these is against, and `tests/security/probing.py` measures it.
+A file can be made so that such numbers give labels away. On a hidden split the ends of intervals are
+therefore rounded outwards to about a tenth of their width, p is a class, and only public methods of different
+teams are compared; teams get the same of their own methods. See `docs/security.md` and
+`tests/security/probing.py`.
 """
 
 import math
@@ -29,9 +28,9 @@ _ROUND: Final = (5, 2, 1)
 
 
 def step_of(width: float, *, decimals: int) -> float:
-    """The grid of an interval's ends: 1, 2 or 5 times a power of ten, at most a tenth of `width`.
+    """Return the grid of an interval's ends: 1, 2 or 5 times a power of ten, at most a tenth of `width`.
 
-    Never finer than values are published.
+    Never finer than scores are published.
 
     >>> step_of(7.1, decimals=1), step_of(0.3, decimals=1), step_of(24.0, decimals=1)
     (0.5, 0.1, 2.0)
@@ -46,7 +45,7 @@ def step_of(width: float, *, decimals: int) -> float:
 
 
 def coarse_ends(low: float, high: float, *, decimals: int) -> tuple[float, float]:
-    """Both ends of an interval rounded outwards to their grid.
+    """Round both ends of an interval outwards to their grid.
 
     >>> coarse_ends(13.61, 20.68, decimals=1), coarse_ends(-0.31, 0.02, decimals=1)
     ((13.5, 21.0), (-0.4, 0.1))
@@ -59,12 +58,12 @@ def coarse_ends(low: float, high: float, *, decimals: int) -> tuple[float, float
 
 
 def is_hidden(edition: Edition) -> bool:
-    """Whether the ground truth is hidden, for workers: the database cannot call open what is marked."""
+    """Tell whether the ground truth is hidden, for workers: a mark outweighs the database."""
     return edition.split.is_hidden or hidden_marks.is_marked(edition.ground_truth_id)
 
 
 def published_ends(low: Floats, high: Floats, *, edition: Edition) -> tuple[Floats, Floats]:
-    """The ends of the intervals of means as an edition publishes them; NaN where there is none."""
+    """Round the ends of intervals as an edition publishes them; NaN stays."""
     if not is_hidden(edition):
         return np.round(low, edition.decimals), np.round(high, edition.decimals)
     shown = np.array(
@@ -77,11 +76,10 @@ def published_ends(low: Floats, high: Floats, *, edition: Edition) -> tuple[Floa
 
 
 def published_difference(computed: Difference, shown: Difference, *, edition: Edition) -> Difference:
-    """A difference as an edition publishes it: `computed` unrounded, `shown` rounded to its decimals.
+    """Round a difference as an edition publishes it: `computed` unrounded, `shown` with its decimals.
 
-    Of a hidden split the ends are coarse and p is only a class. The ends are rounded outwards, to 0 as well,
-    so that the interval holds what the computed one holds. So 0 may be an end although p is below 0.05, and
-    `p_below` alone says what is significant.
+    On a hidden split the ends are rounded outwards, so 0 may be an end although p is below 0.05: `p_below`
+    alone says what is significant.
     """
     if computed.low is None or computed.high is None or not is_hidden(edition):
         return shown
@@ -94,10 +92,7 @@ def published_difference(computed: Difference, shown: Difference, *, edition: Ed
 
 
 def why_withheld(first: Entry, second: Entry, *, edition: Edition) -> str:
-    """Why interval and p of a pair are withheld, in a sentence; "" if they are published.
-
-    Entries are as their reader sees them.
-    """
+    """Say why interval and p of a pair, as their reader sees it, are withheld; "" if they are published."""
     for entry in (first, second):
         if entry.visibility == Visibility.ANONYMOUS and not entry.is_mine:
             return (
@@ -122,7 +117,7 @@ def why_withheld(first: Entry, second: Entry, *, edition: Edition) -> str:
 
 
 def why_withheld_by_mark(first: Submission, second: Submission, *, edition: Edition) -> str:
-    """The same for workers: of a pair on a split that the database calls open and the mark calls hidden."""
+    """Say the same for workers: a mark may call hidden what the database calls open."""
     if edition.split.is_hidden or not hidden_marks.is_marked(edition.ground_truth_id):
         return ""
     methods = (first.method, second.method)

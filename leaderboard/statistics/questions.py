@@ -1,4 +1,4 @@
-"""The queue of comparisons: first come, first served; those without a request come last."""
+"""The queue of comparisons: requested ones in order, others last."""
 
 import math
 from collections.abc import Collection, Sequence
@@ -17,7 +17,7 @@ Key = tuple[UUID, UUID]
 
 
 class AskedTooOften(Exception):
-    """The account or address has had many pairs computed within a minute; more after `retry_after_s`."""
+    """The account or address has had too many pairs computed within a minute."""
 
     code = "throttled"
     field = "m"
@@ -31,22 +31,18 @@ class AskedTooOften(Exception):
 
 
 class NewComparisons(rate_limits.Throttle):
-    """The rate of comparisons not asked for before, of one account or address."""
+    """The rate of new comparisons of one account or address."""
 
     rates, scope = "PAGE_RATES", "compare"
 
     def identity(self, request: Any) -> object | None:
-        """Who asks: there is no request here."""
         return request
 
 
 def ask(
     *, edition: Edition, pairs: Sequence[Key], user: User | AnonymousUser, address: str, now: datetime
 ) -> None:
-    """Have workers compare these pairs of evaluations, which were not asked for before.
-
-    Raises `AskedTooOften`; nothing is written then.
-    """
+    """Queue comparisons of new pairs of evaluations. Raises `AskedTooOften`; nothing is written then."""
     throttle = NewComparisons()
     who = f"account:{user.pk}" if user.is_authenticated else address
     if pairs and not throttle.allow_request(who):
@@ -55,7 +51,7 @@ def ask(
 
 
 def note(*, edition: Edition, pairs: Sequence[Key]) -> None:
-    """Queue comparisons of these pairs of evaluations, behind all that a user asked for."""
+    """Queue comparisons of these pairs behind all that a user asked for."""
     _write(edition=edition, pairs=pairs, asked_at=None)
 
 
@@ -81,11 +77,11 @@ def _write(*, edition: Edition, pairs: Sequence[Key], asked_at: datetime | None)
 
 
 def waiting(*, readable_truths: Collection[str]) -> QuerySet[Comparison]:
-    """Comparisons still to be computed, in order, whose ground truth is in `readable_truths` (digests)."""
+    """Return comparisons to compute, in order, whose ground truth is in `readable_truths` (digests)."""
     rows = Comparison.objects.filter(computed_at=None, edition__ground_truth__in=readable_truths)
     return rows.order_by(F("asked_at").asc(nulls_last=True), "pk")
 
 
 def begin(row: Comparison, *, now: datetime) -> None:
-    """Send the pair to the end of the line: one that fails keeps nothing waiting."""
+    """Send the pair to the end of the queue: one that fails must not block others."""
     Comparison.objects.filter(pk=row.pk, computed_at=None).update(asked_at=now)

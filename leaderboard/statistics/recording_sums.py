@@ -1,8 +1,7 @@
-"""Sums per recording, saved in the private directory of workers, next to the ground truth.
+"""Sums per recording, saved in the private directory of workers when a file is scored.
 
-They are made when a file is scored, and are all that intervals, rank ranges and comparisons need. What is
-missing, as on another worker, is made again from the submission's values. An edition's units are days or
-recordings: whole recordings added up.
+Intervals, rank ranges and comparisons need nothing else. Missing sums, as on another worker, are computed
+again.
 """
 
 import math
@@ -31,7 +30,7 @@ Floats = NDArray[np.float64]
 
 
 def path(edition: Edition, *, file: SentFile) -> Path:
-    """Where the sums of a file are kept for this ground truth and protocol."""
+    """Return the path of a file's sums for this ground truth and protocol."""
     truth, digest, manifest = (
         each.removeprefix("sha256:") for each in (edition.ground_truth_id, file.digest, file.manifest_digest)
     )
@@ -40,7 +39,7 @@ def path(edition: Edition, *, file: SentFile) -> Path:
 
 
 def save(edition: Edition, *, file: SentFile, bags: RecordingSums | None) -> None:
-    """Keep a file's sums, little-endian float64. A disk that does not take them costs only time later."""
+    # Without the sums on the disk they are computed again.
     if bags is None:
         return
     kept = path(edition, file=file)
@@ -55,7 +54,7 @@ def save(edition: Edition, *, file: SentFile, bags: RecordingSums | None) -> Non
 
 
 def load(edition: Edition, *, file: SentFile) -> Floats | None:
-    """The sums that were kept, (G, columns); None if they are not all there."""
+    """Load the sums, (G, columns), if they are complete."""
     shape = edition.ground_truth.n_recordings, len(edition.rules.score_names)
     try:
         data = path(edition, file=file).read_bytes()
@@ -67,10 +66,7 @@ def load(edition: Edition, *, file: SentFile) -> Floats | None:
 
 
 def sums_of(edition: Edition, *, file: SentFile) -> Floats:
-    """The sums of a scored file, kept or made again, (G, columns).
-
-    Raises what `file_values.read` raises.
-    """
+    """Load or compute the sums of a scored file, (G, columns). Raises what `file_values.read` raises."""
     kept = load(edition, file=file)
     if kept is not None:
         return kept
@@ -82,22 +78,22 @@ def sums_of(edition: Edition, *, file: SentFile) -> Floats:
 
 
 def counts_of(edition: Edition) -> Floats:
-    """Sequences per recording in every column, (G, columns). Raises `OSError` without the values."""
+    """Count sequences per recording in every column, (G, columns). Raises `OSError` without the values."""
     return scorer(edition.ground_truth_id, edition.protocol).recording_counts
 
 
 def unit_sums_of(edition: Edition, *, file: SentFile) -> Floats:
-    """The same added up to the edition's units, (U, columns)."""
+    """Add the sums up to the edition's units, (U, columns)."""
     return uncertainty.by_units(sums_of(edition, file=file), units_of(edition))
 
 
 def unit_counts_of(edition: Edition) -> Floats:
-    """Sequences per unit of the edition in every column, (U, columns). Raises `OSError` as `counts_of`."""
+    """Count the sequences per unit in every column, (U, columns). Raises `OSError` as `counts_of`."""
     return uncertainty.by_units(counts_of(edition), units_of(edition))
 
 
 def units_of(edition: Edition) -> Units:
-    """The units that the edition keeps. Raises `OSError` without the values of its ground truth."""
+    """Return the edition's units. Raises `OSError` without the values of its ground truth."""
     return _units(edition.ground_truth_id, edition.unit)
 
 
@@ -107,13 +103,13 @@ def _units(truth_digest: str, kind: str) -> Units:
 
 
 def floor_of(edition: Edition) -> dict[str, float | None]:
-    """What the ground truth itself scores, as it is published. Raises `OSError` without access to it."""
+    """Return the score of the ground truth itself. Raises `OSError` without access to it."""
     floor = scores.floor_of(truth_values.load(edition.ground_truth_id), protocol=edition.protocol)
     return {name: rounded(value, decimals=edition.decimals) for name, value in floor.items()}
 
 
 def scorer(truth_digest: str, protocol: str) -> Scorer:
-    """Ready for every file of an edition, with the truth as it is cached. Raises as `truth_values.load`."""
+    """Make the scorer of an edition with the cached truth. Raises as `truth_values.load`."""
     truth: GroundTruth = truth_values.load(truth_digest)
     return _scorer(truth, protocol)
 

@@ -1,7 +1,4 @@
-"""Whether the recordings of one day are alike in an edition, for maintainers where the ground truth is.
-
-What is told are ratios of sums of squares over all recordings: they say nothing of a label.
-"""
+"""Whether the recordings of one day are alike in an edition, for maintainers; the ratios tell no label."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -18,7 +15,7 @@ N_FIRST: Final = 20
 
 
 def groups_of(edition: Edition) -> Units:
-    """What is checked: the edition's own units, else the days of its recordings, however few.
+    """Return the edition's own units, else the days of its recordings.
 
     Raises `Refused` where there is nothing above the recording, `OSError` without the values.
     """
@@ -31,7 +28,7 @@ def groups_of(edition: Edition) -> Units:
 
 
 def checks(edition: Edition, groups: Units) -> Iterator[tuple[str, Dependence | None]]:
-    """Of the MiD of the first methods, best first, and of how each differs from the best; None where unknown.
+    """Check the MiD of the first methods, best first, and their differences from the best.
 
     Raises what `recording_sums.sums_of` raises.
     """
