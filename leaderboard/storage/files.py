@@ -1,7 +1,4 @@
-"""The file store: everything in it is named by the digest of its bytes and never changes.
-
-It goes through Django's storages, so that workers and web on several machines can share an S3-compatible one.
-"""
+"""The file store, through Django's storages: every file is named by its digest and never changes."""
 
 import hashlib
 import os
@@ -33,27 +30,25 @@ FRESH = timedelta(hours=12)
 
 
 class StoreAway(OSError):
-    """The store is on another machine and does not answer, or refuses us. Asking again later may help."""
+    """The store does not answer, or refuses us. Another try later may help."""
 
 
 class Rebuildable(ContentFile):
-    """Content that can be made again: it need not be on the disk before `save` returns."""
+    """Content that can be made again, so it need not be durable."""
 
 
 class DurableFileSystemStorage(FileSystemStorage):
-    """A local directory whose files are whole or absent, and on the disk before `save` returns.
+    """A local directory whose files are whole or absent, and durable before `save` returns.
 
-    Of what is `Rebuildable`, a power cut may leave a file that is not whole.
-
-    A file is written below `.incoming`, flushed to the disk, and renamed.
+    A file is written below `.incoming`, flushed, and renamed. A `Rebuildable` may be damaged by a power cut.
     """
 
     def get_available_name(self, name: str, max_length: int | None = None) -> str:
-        """The name itself: equal names hold equal bytes here."""
+        # Equal names hold equal bytes.
         return name
 
     def exists(self, name: str) -> bool:
-        """Whether the file is there, and would still be after a power cut."""
+        # The file must still be there after a power cut.
         is_there = super().exists(name)
         if is_there:
             # Whoever renamed it may have been killed before the directory was on the disk.
@@ -83,7 +78,7 @@ class DurableFileSystemStorage(FileSystemStorage):
         return name
 
     def _settle(self, target: Path) -> None:
-        """Put the directories above a file on the disk: a rename is durable no sooner."""
+        """Flush the directories above a file: a rename is durable no sooner."""
         root = Path(self.location)
         for directory in target.parents:
             descriptor = os.open(directory, os.O_RDONLY)
@@ -95,7 +90,7 @@ class DurableFileSystemStorage(FileSystemStorage):
                 return
 
     def delete_if_older(self, name: str, than: datetime) -> bool:
-        """Remove a file unless it was written after `than`, even in this moment; whether it was removed."""
+        """Remove a file unless it was written after `than`. Returns whether it was removed."""
         target = Path(self.path(name))
         aside = Path(self.location) / INCOMING / f"removed-{target.name}"
         aside.parent.mkdir(exist_ok=True)
@@ -111,7 +106,7 @@ class DurableFileSystemStorage(FileSystemStorage):
         return False
 
     def leftovers(self) -> Iterator[Path]:
-        """Unfinished files that are older than `LEFTOVER_S`: no process still writes them."""
+        """Yield unfinished files that are older than `LEFTOVER_S`, which no process still writes."""
         for entry in (Path(self.location) / INCOMING).glob("*"):
             # Another process may be tidying up too.
             with suppress(FileNotFoundError):
@@ -121,7 +116,7 @@ class DurableFileSystemStorage(FileSystemStorage):
 
 @dataclass(frozen=True)
 class StoredFile:
-    """What the store knows of a file."""
+    """Digest and size of a file."""
 
     digest: str
     size_bytes: int
@@ -129,7 +124,7 @@ class StoredFile:
 
 @contextmanager
 def replacing(target: Path) -> Iterator[Path]:
-    """A file next to `target` to write, for its owner only; it replaces `target` once it is on the disk."""
+    """Yield a private file to write, which replaces `target` once it is durable."""
     target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     handle, temporary = tempfile.mkstemp(dir=target.parent, suffix=target.suffix)
     os.close(handle)
@@ -145,23 +140,20 @@ def replacing(target: Path) -> Iterator[Path]:
 
 
 def store() -> Storage:
-    """The configured file store."""
     return storages["files"]
 
 
 def predictions_name(digest: str) -> str:
-    """Where a prediction file of this digest is kept."""
     hexadecimal = digest.removeprefix("sha256:")
     return f"predictions/{hexadecimal[:2]}/{hexadecimal}.json"
 
 
 def manifest_name(digest: str) -> str:
-    """Where the public manifest of this digest is kept."""
     return f"manifests/{digest.removeprefix('sha256:')}.csv"
 
 
 def measure(upload: "File[bytes]") -> StoredFile:
-    """Digest and size of an uploaded file; nothing is kept."""
+    """Hash and measure an upload."""
     digest = hashlib.sha256()
     size_bytes = 0
     for chunk in upload.chunks(CHUNK_BYTES):
@@ -173,10 +165,9 @@ def measure(upload: "File[bytes]") -> StoredFile:
 def save_predictions(
     upload: "File[bytes]", *, now: datetime, measured: StoredFile | None = None
 ) -> StoredFile:
-    """Keep an uploaded file. When this returns, its bytes are durable; the same bytes are kept once.
+    """Save an upload durably; the same bytes once. Raises `OSError` (`ENOSPC` and `EDQUOT`: full).
 
-    Bytes that have been there for long are written again: whoever cleans up looks for old files that no row
-    names. Raises `OSError` if the store does not take it: `ENOSPC` and `EDQUOT` say that it is full.
+    Old bytes are written again, since cleaning looks for old files that no row names.
     """
     kept = measured or measure(upload)
     name = predictions_name(kept.digest)
@@ -187,7 +178,7 @@ def save_predictions(
 
 
 def require_unchanged(upload: "File[bytes]", *, digest: str) -> None:
-    """Keep an uploaded file again if it was removed meanwhile; the caller holds `orphans.lock`."""
+    """Save an upload again if it was removed meanwhile; the caller has called `orphans.lock`."""
     name = predictions_name(digest)
     if not store().exists(name):
         upload.seek(0)
@@ -203,16 +194,12 @@ def _is_fresh(name: str, *, now: datetime) -> bool:
 
 
 def aligned_name(*, manifest_digest: str, digest: str) -> str:
-    """Where the values of a prediction file are kept, aligned with a manifest."""
     manifest = manifest_digest.removeprefix("sha256:")
     return f"aligned/{manifest[:16]}/{digest.removeprefix('sha256:')}.f8"
 
 
 def save_aligned(predictions: Predictions) -> None:
-    """Keep a file's values in seconds as little-endian float64, in ascending anno_id of the file's manifest.
-
-    Before them stands their SHA-256, so that values that were changed or cut off are never scored.
-    """
+    """Save values in seconds, little-endian float64 by anno_id of its manifest, after their SHA-256."""
     manifest = predictions.manifest
     name = aligned_name(manifest_digest=manifest.digest, digest=predictions.digest)
     values = predictions.ttc_s[manifest.rows_by_id].astype("<f8", copy=False).tobytes()
@@ -224,16 +211,13 @@ def save_aligned(predictions: Predictions) -> None:
 
 
 def load_aligned(file: SentFile, *, n_sequences: int) -> NDArray[np.float64] | None:
-    """The seconds that were kept of a file, (n,), in ascending anno_id of its own manifest.
-
-    None if they are not all there, or not as they were kept.
-    """
+    """Load the values of a file in seconds, (n,), by anno_id of its own manifest; None if damaged."""
     values = _checked(_read(aligned_name(manifest_digest=file.manifest_digest, digest=file.digest)))
     return np.frombuffer(values, dtype="<f8") if len(values) == 8 * n_sequences else None
 
 
 def _read(name: str) -> bytes:
-    """What the store has under this name; nothing if it has nothing, or does not answer."""
+    # A store that does not answer counts as empty: the values can be made again.
     try:
         with store().open(name, "rb") as kept:
             data: bytes = kept.read()
@@ -243,22 +227,19 @@ def _read(name: str) -> bytes:
 
 
 def _checked(data: bytes) -> bytes:
-    """The values behind their digest; nothing if it is not theirs."""
+    # Values that were changed or cut off are never scored.
     digest, values = data[:_DIGEST_BYTES], data[_DIGEST_BYTES:]
     return values if hashlib.sha256(values).digest() == digest else b""
 
 
 def save_manifest(manifest: Manifest) -> None:
-    """Keep a public manifest, as CSV. Corrections of labels have the one that is there."""
+    """Save a public manifest as CSV, once."""
     if not store().exists(manifest_name(manifest.digest)):
         store().save(manifest_name(manifest.digest), ContentFile(manifest.to_csv()))
 
 
 @contextmanager
 def opened_predictions(digest: str) -> Iterator[IO[bytes]]:
-    """A prediction file, which has a file descriptor in both stores.
-
-    Raises `OSError` if the store does not have it or does not answer.
-    """
+    """Open a prediction file with a file descriptor. Raises `OSError`."""
     with store().open(predictions_name(digest), "rb") as kept:
         yield kept

@@ -1,8 +1,4 @@
-"""Marks of hidden ground truth: a file next to the values says that they were imported as hidden ones.
-
-Who can write into the database could call a split open. The private directory tells workers otherwise, and
-only workers and the maintainers' commands can ask it.
-"""
+"""Marks of hidden ground truth: files next to the values, out of reach of a writer of the database."""
 
 from pathlib import Path
 
@@ -15,7 +11,7 @@ def put(digest: str) -> None:
 
 
 def is_marked(digest: str) -> bool:
-    """Whether the values of this digest were imported as hidden ones, whatever the database says today."""
+    """Tell whether the values of this digest were imported as hidden."""
     return _path(digest).exists()
 
 

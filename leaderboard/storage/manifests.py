@@ -1,8 +1,4 @@
-"""Former manifests, for workers: a file's keys are read for ever with the manifest that it was written for.
-
-The file store has every public manifest under its digest. Workers keep them beside their sums, in the form
-that the reading process takes; what is missing there is made anew.
-"""
+"""Former manifests, kept by workers in the form that the reading process takes."""
 
 import tempfile
 from functools import lru_cache
@@ -15,10 +11,7 @@ from leaderboard.storage import files
 
 
 def path(digest: str) -> Path:
-    """A file with the manifest of this digest, for `Manifest.load`.
-
-    Raises `OSError` if the store does not have it whole, or if there is no room for it here.
-    """
+    """Return a file for `Manifest.load`. Raises `OSError` without the whole manifest or room for it."""
     kept = Path(settings.BAGS_DIR or Path(settings.GROUND_TRUTH_DIR) / "bags") / "manifests"
     target = kept / f"{digest.removeprefix('sha256:')}.npz"
     if not target.exists():
@@ -30,7 +23,7 @@ def path(digest: str) -> Path:
 
 @lru_cache(maxsize=1)
 def load(digest: str) -> Manifest:
-    """The manifest of this digest. Raises `OSError` as `path` does."""
+    """Load the manifest of this digest. Raises `OSError` as `path` does."""
     return _stored(digest)
 
 

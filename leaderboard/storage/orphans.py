@@ -1,11 +1,8 @@
-"""Files that no submission names: left of uploads that were refused, or whose rows were never written.
+"""Files that no submission names: of refused uploads, or of processes that died before they wrote the rows.
 
-A submission's bytes are stored before its rows, so that nothing is acknowledged and then lost; the price is a
-file too many now and then. A request that is refused once its file is stored removes it. What was left all
-the same (a process was killed, a database went away) is removed once it has not been written for a day.
-
-Equal bytes are one file, whoever sends them. So whoever is about to write a row holds the file, and looks
-whether it is still there; and whoever removes one has it alone, and looks whether no row names it.
+A submission's bytes are stored before its rows, so that nothing acknowledged is lost. Orphans are removed
+after a day. Equal bytes are one file, so a writer of a row locks the file and checks it, and a remover locks
+it alone and checks the rows.
 """
 
 import hashlib
@@ -44,10 +41,7 @@ class Orphan:
 
 
 def orphans(*, now: datetime) -> Iterator[Orphan]:
-    """Prediction files, and values made from them, that no submission has named for a day.
-
-    Raises `OSError` if the store does not answer.
-    """
+    """Yield predictions and values that no submission has named for a day. Raises `OSError`."""
     for folder in FOLDERS:
         for name, digest in _without_rows(folder):
             try:
@@ -60,7 +54,7 @@ def orphans(*, now: datetime) -> Iterator[Orphan]:
 
 
 def remove(orphan: Orphan, *, now: datetime) -> bool:
-    """Remove an orphan, unless it has become a submission's meanwhile. Returns whether it was removed."""
+    """Remove an orphan, unless it has become a submission's. Returns whether it was removed."""
     with transaction.atomic():
         if not _locked_alone(orphan.digest) or Submission.objects.filter(digest=orphan.digest).exists():
             return False
@@ -81,9 +75,9 @@ def remove(orphan: Orphan, *, now: datetime) -> bool:
 
 @contextmanager
 def unless_refused(*refusals: type[Exception], digest: str) -> Iterator[None]:
-    """Remove the stored file if one of these is raised, unless a submission names it or is about to.
+    """Remove the stored file on one of these exceptions, unless a submission names it or is about to.
 
-    To be entered before the transaction that writes the row, which is undone by then.
+    Enter it before the transaction that writes the row.
     """
     try:
         yield
@@ -106,7 +100,7 @@ def _remove_unnamed(digest: str) -> bool:
 
 
 def lock(digest: str) -> None:
-    """Prevent removal of a file of this digest until the transaction ends; others may hold it as well.
+    """Prevent removal of a file of this digest until the transaction ends.
 
     It is the first lock of its transaction, so that a removal never waits for a holder of other locks.
     """
@@ -129,13 +123,13 @@ def _lock(function: str, digest: str) -> bool:
 
 
 def leftovers() -> list[Path]:
-    """What killed processes left of files that they were writing; a store elsewhere has none."""
+    """Return unfinished files of killed processes."""
     store = files.store()
     return list(store.leftovers()) if isinstance(store, files.DurableFileSystemStorage) else []
 
 
 def _without_rows(folder: str) -> Iterator[tuple[str, str]]:
-    """Name and digest of files in the folder's folders that no submission names, whether withdrawn or not."""
+    """Yield name and digest of files that no submission names, withdrawn ones included."""
     known = set(Submission.objects.values_list("digest", flat=True))
     for part in _folders(folder):
         named = {

@@ -1,7 +1,7 @@
-"""The file store in an S3-compatible service, for web and workers on several machines.
+"""The file store in an S3-compatible service.
 
-Configured by one URL, `s3://bucket/folder?endpoint=https://…&region=…`; the keys come from the environment
-(`AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`) or from the machine's role, never from the URL.
+Configured by one URL, `s3://bucket/folder?endpoint=https://…&region=…`; keys come from the environment or the
+machine's role, never from the URL.
 """
 
 import errno
@@ -28,11 +28,7 @@ _FULL = frozenset({"InsufficientStorage", "QuotaExceeded", "XMinioStorageFull", 
 
 
 def parsed(url: str) -> dict[str, str | None]:
-    """The settings in `s3://bucket/folder?endpoint=…&region=…`. Raises `ImproperlyConfigured`.
-
-    >>> parsed("s3://tsttc/files")
-    {'bucket_name': 'tsttc', 'location': 'files', 'endpoint_url': None, 'region_name': 'us-east-1'}
-    """
+    """Parse `s3://bucket/folder?endpoint=…&region=…`. Raises `ImproperlyConfigured`."""
     parts = urlsplit(url)
     if "@" in parts.netloc:
         raise ImproperlyConfigured(
@@ -56,7 +52,7 @@ def parsed(url: str) -> dict[str, str | None]:
 
 @contextmanager
 def _as_os_errors() -> Iterator[None]:
-    """Turn the client's many exceptions into what a disk would raise, which the rest of the system knows."""
+    """Turn the client's many exceptions into `OSError`s, as a disk would raise."""
     try:
         yield
     except ClientError as fault:
@@ -71,10 +67,7 @@ def _as_os_errors() -> Iterator[None]:
 
 
 class S3FileStore(S3Storage):
-    """A bucket whose objects are whole or absent: each is written by one request.
-
-    Whatever goes wrong is an `OSError`, as it would be with a directory.
-    """
+    """A bucket whose objects are whole or absent; every failure is an `OSError`."""
 
     def __init__(self, *, url: str) -> None:
         address = parsed(url)
@@ -101,7 +94,7 @@ class S3FileStore(S3Storage):
 
     @property
     def _client(self) -> Any:
-        """This thread's client."""
+        # One client for each thread.
         return self.connection.meta.client
 
     def _target(self, name: str) -> dict[str, str]:
@@ -116,7 +109,7 @@ class S3FileStore(S3Storage):
         return name
 
     def _open(self, name: str, mode: str = "rb") -> "File[bytes]":
-        """The object as a local file, whole before anybody reads of it, with a real file descriptor."""
+        # A local file with a real file descriptor, whole before anybody reads it.
         if mode != "rb":
             raise ValueError(f"files of the store are opened with mode 'rb', not {mode!r}")
         local = tempfile.TemporaryFile()  # noqa: SIM115 - the caller closes it
@@ -130,20 +123,18 @@ class S3FileStore(S3Storage):
         return File(local, name)
 
     def exists(self, name: str) -> bool:
-        """Whether the store has the file. Raises `OSError` if it does not say."""
         with _as_os_errors():
             return bool(super().exists(name))
 
     def delete(self, name: str) -> None:
-        """Remove a file, if it is there."""
         with _as_os_errors():
             super().delete(name)
 
     def delete_if_older(self, name: str, than: datetime) -> bool:
         """Remove a file unless it was written after `than`. Returns whether it was removed.
 
-        S3 has no rename, so a file that is written again between the question and the removal is removed too.
-        Whoever wrote it looks again before a row names it (`leaderboard/storage/orphans.py`).
+        S3 has no rename, so a file written between check and removal is removed too; its writer looks again
+        before a row names it (`leaderboard/storage/orphans.py`).
         """
         if self.get_modified_time(name) >= than:
             return False
@@ -151,18 +142,15 @@ class S3FileStore(S3Storage):
         return True
 
     def listdir(self, name: str) -> tuple[list[str], list[str]]:
-        """Folders and files below a folder."""
         with _as_os_errors():
             folders, names = super().listdir(name)
         return folders, names
 
     def size(self, name: str) -> int:
-        """The size in bytes."""
         with _as_os_errors():
             return int(self._client.head_object(**self._target(name))["ContentLength"])
 
     def get_modified_time(self, name: str) -> datetime:
-        """When the file was last written, by the store's clock."""
         with _as_os_errors():
             modified: datetime = self._client.head_object(**self._target(name))["LastModified"]
         return modified

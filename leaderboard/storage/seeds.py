@@ -1,10 +1,8 @@
 """Seeds of an edition's random numbers: public on open splits, known to workers alone on hidden ones.
 
-Intervals, p-values and rank ranges come from random weights and signs. Of an open split they follow from the
-digest of its ground truth, so that everybody gets the board's numbers offline. Of a hidden split the digest
-is mixed with a secret: numbers that can be computed for every hypothesis about the labels would tell which
-one fits. The secret is a file beside the ground truth, in the private directory; it is never in the database,
-in a log or in an answer. Another secret gives other random numbers, as good as the former ones.
+On an open split they follow from the digest of the ground truth, so that anybody gets the board's numbers
+offline. On a hidden split a secret is added: else numbers could be computed for every hypothesis about the
+labels. The secret is a file in the private directory, never in the database, a log or an answer.
 """
 
 import hashlib
@@ -22,19 +20,16 @@ N_BYTES: Final = 32
 
 
 class NoSecret(OSError):
-    """The secret of the hidden splits' random numbers is not there, or damaged; the text says what to do."""
+    """The secret of the hidden splits is missing or damaged."""
 
 
 def path() -> Path:
-    """The path of the secret: next to the ground truth, to be kept in the same backup."""
+    """Return the path of the secret, next to the ground truth."""
     return Path(settings.GROUND_TRUTH_DIR) / "seed.key"
 
 
 def seed_of(edition: Edition) -> str:
-    """What the weights and signs of an edition are made of, the same in all editions of one ground truth.
-
-    Raises `NoSecret` of a hidden split where this process can neither read the secret nor make it.
-    """
+    """Return the seed, the same in all editions of one ground truth. Raises `NoSecret`."""
     digest = edition.ground_truth_id
     if not (edition.split.is_hidden or hidden_marks.is_marked(digest)):
         return digest
@@ -42,10 +37,7 @@ def seed_of(edition: Edition) -> str:
 
 
 def ensure() -> None:
-    """Make the secret where there is none: whole or not at all, for its owner only.
-
-    Raises `OSError` where the directory is not to be written.
-    """
+    """Make the secret where there is none: whole or not at all, private to its owner. Raises `OSError`."""
     if not path().exists():
         with files.replacing(path()) as made:
             made.write_text(secrets.token_hex(N_BYTES) + "\n")

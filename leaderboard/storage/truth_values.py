@@ -1,7 +1,4 @@
-"""Ground-truth values: in a private directory, written by maintainers' commands and read by workers only.
-
-They are nowhere else: the database has their digest and counts, the file store the public manifest.
-"""
+"""Ground-truth values: in a private directory, written by maintainers' commands, read by workers only."""
 
 import os
 from functools import lru_cache
@@ -14,20 +11,16 @@ from leaderboard.storage import files, hidden_marks, seeds
 
 
 def values_path(digest: str) -> Path:
-    """Where the worker finds the values of this digest."""
     return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.npz"
 
 
 def manifest_path(digest: str) -> Path:
-    """Where the worker finds the manifest of the ground truth of this digest, without the values."""
+    """Return the path of the manifest, without the values."""
     return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.manifest.npz"
 
 
 def save(truth: evaluator.GroundTruth, *, is_hidden: bool) -> None:
-    """Write values and manifest to the private directory: whole or not at all, readable by its owner only.
-
-    Hidden ones are marked as such, before they can be read.
-    """
+    """Write values and manifest, whole or not at all, private to the owner; mark hidden ones first."""
     directory = Path(settings.GROUND_TRUTH_DIR)
     directory.mkdir(parents=True, exist_ok=True, mode=0o700)
     if is_hidden:
@@ -40,7 +33,7 @@ def save(truth: evaluator.GroundTruth, *, is_hidden: bool) -> None:
 
 
 def readable_digests() -> frozenset[str]:
-    """The digests whose values this process can read: what it may take on. Empty without any access."""
+    """Return the digests whose values this process can read."""
     try:
         paths = list(Path(settings.GROUND_TRUTH_DIR).iterdir())
     except OSError:
@@ -51,5 +44,5 @@ def readable_digests() -> frozenset[str]:
 
 @lru_cache(maxsize=2)
 def load(digest: str) -> evaluator.GroundTruth:
-    """The values of this digest, for a worker. Raises `OSError` if this process has no access to them."""
+    """Load the values, for a worker. Raises `OSError` without access."""
     return evaluator.GroundTruth.load(values_path(digest))

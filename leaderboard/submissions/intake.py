@@ -1,4 +1,4 @@
-"""Submissions: one file for one split, acknowledged only once it can no longer be lost."""
+"""Intake of submissions: one file for one split, acknowledged only once it is durable."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -27,7 +27,7 @@ log = structlog.get_logger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class SubmissionRequest:
-    """A file to submit, as it was sent; empty `details` of the method change nothing."""
+    """A file to submit; empty `details` of the method change nothing."""
 
     user: User
     split_name: str
@@ -42,7 +42,7 @@ class SubmissionRequest:
     may_edit: bool = True
 
     def cleaned(self) -> "SubmissionRequest":
-        """The request with clean texts and details. Raises `Refused`."""
+        """Return the request with clean texts and details. Raises `Refused`."""
         return replace(
             self,
             method_name=clean_name("method", self.method_name),
@@ -53,7 +53,7 @@ class SubmissionRequest:
         )
 
     def changes_of(self, method: Method | None) -> dict[str, Any]:
-        """The details that the request changes; none of a method yet to be made. Raises `Refused`."""
+        """Return the details that the request changes. Raises `Refused`."""
         if method is None:
             editing.require_hardware(self.details, method=None)
             return {}
@@ -76,9 +76,9 @@ class Submitted:
 def submit(request: SubmissionRequest) -> Submitted:
     """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
 
-    The same bytes again, for the same split, method and manifest, are answered with the first submission and
-    change nothing. Details that differ from the method's own replace them; without `may_edit` they are
-    refused. Raises `Refused` or `usage.QuotaExceeded` (nothing is kept then).
+    The same bytes for the same split, method and manifest return the first submission. Details that differ
+    replace the method's; without `may_edit` they are refused. Raises `Refused` or `usage.QuotaExceeded`;
+    nothing is kept then.
     """
     split = _open_split(request.split_name, now=request.now)
     request = request.cleaned()
@@ -106,8 +106,6 @@ def submit(request: SubmissionRequest) -> Submitted:
 
 
 class _Answers(NamedTuple):
-    """The team's method of that name, its submission of the same bytes, and the changes of its details."""
-
     method: Method | None
     sent_before: Submission | None
     changes: Mapping[str, Any]
@@ -116,10 +114,9 @@ class _Answers(NamedTuple):
 def _answers(
     request: SubmissionRequest, file: files.StoredFile, *, split: Split, team: Team | None
 ) -> _Answers:
-    """Ask what decides on a file, in this order: admission, same bytes, quota, changes, name.
+    """Check a file in this order: admission, same bytes, quota, changes, name.
 
-    Asked twice: before the bytes are written, to spare the disk, and with split and team locked, for certain.
-    Raises `Refused` or `usage.QuotaExceeded`.
+    Runs twice: before the bytes are written, to spare the disk, and under locks. Raises as `submit`.
     """
     admissions.require(team=team, split=split)
     method = Method.objects.existing().filter(team=team, name=request.method_name).first()
@@ -135,7 +132,6 @@ def _answers(
 
 
 def _record(request: SubmissionRequest, file: files.StoredFile, *, split: Split) -> Submitted:
-    """Write the rows of a stored file and queue it. Raises `Refused` or `usage.QuotaExceeded`."""
     # From here on the board stays, so the file is queued in an edition with the manifest that its row names.
     split = Split.objects.select_related("current_edition__ground_truth").lock_shared(split.pk)
     team = _locked_team(request.user)
@@ -166,7 +162,6 @@ def _record(request: SubmissionRequest, file: files.StoredFile, *, split: Split)
 
 
 def _locked_team(user: User) -> Team:
-    """The person's team, new if there is none, locked until the transaction ends."""
     usage.hold_accounts(user=user)
     team = teams.team_of(user=user)
     usage.lock(team=team)
@@ -175,7 +170,7 @@ def _locked_team(user: User) -> Team:
 
 
 def _queue(submission: Submission, *, split: Split) -> None:
-    """Queue the submission for the published edition and any draft; the caller has locked the split."""
+    """Queue for the published edition and any draft; the caller has locked the split."""
     in_preparation = Q(published_at=None, discarded_at=None)
     for edition in split.editions.filter(in_preparation | Q(pk=split.current_edition_id)):
         lifecycle.enqueue(submission=submission, edition=edition)
@@ -201,7 +196,6 @@ def _token_split(method: Method, changes: Mapping[str, str]) -> Refused:
 
 
 def _sent_before(file: files.StoredFile, *, split: Split, method: Method) -> Submission | None:
-    """The active submission of the same bytes under the manifest that is public now."""
     names = _sent_file(file, split)._asdict()
     return Submission.objects.active().filter(split=split, method=method, **names).first()
 
@@ -230,7 +224,7 @@ def too_large(*, n_bytes: int) -> str:
 
 
 def _clean_filename(name: str) -> str:
-    """The last part of a file's name with printable characters only; it is shown, never used as a path."""
+    # It is shown, never used as a path.
     last = name.replace("\\", "/").rpartition("/")[2]
     return "".join(c for c in last if c.isprintable())[:200]
 

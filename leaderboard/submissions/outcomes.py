@@ -1,4 +1,4 @@
-"""The outcome of a submission for a reader: progress, rank on the current board, comparison with others."""
+"""The outcome of a submission for a reader: progress, rank, comparison with others."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,7 +22,7 @@ AWAITED_FOR = timedelta(minutes=5)
 
 @dataclass(frozen=True)
 class BoardPosition:
-    """Where a scored submission is on the present board."""
+    """The position of a scored submission on the present board."""
 
     edition: Edition
     rows: tuple[Entry, ...]  # everybody's
@@ -36,7 +36,7 @@ class BoardPosition:
 
 @dataclass(frozen=True)
 class SubmissionView:
-    """A submission with its progress and, if it is on the board, its position."""
+    """A submission with its progress and position."""
 
     submission: Submission
     progress: Progress
@@ -49,7 +49,7 @@ class SubmissionView:
 
 
 def for_submissions(rows: Iterable[Submission], *, now: datetime) -> tuple[SubmissionView, ...]:
-    """The views of these submissions, best fetched with their evaluations, editions and scores."""
+    """Return the views of these submissions, best fetched with evaluations, editions and scores."""
     pairs = [(submission, progress_of(submission)) for submission in rows]
     positions = _positions([each for each in pairs if _is_on_board(*each)])
     return tuple(
@@ -64,14 +64,14 @@ def for_submissions(rows: Iterable[Submission], *, now: datetime) -> tuple[Submi
 
 
 def board_position_of(submission: Submission, progress: Progress) -> BoardPosition | None:
-    """The position of one submission; None unless it is in the published edition."""
+    """Return the position of one submission; None unless it is in the published edition."""
     if not _is_on_board(submission, progress):
         return None
     return _positions([(submission, progress)]).get(submission.pk)
 
 
 def can_be_withdrawn(submission: Submission) -> bool:
-    """Whether withdrawing it changes anything."""
+    """Tell whether withdrawing changes anything."""
     ends = {each.status for each in submission.evaluations.all()}
     return submission.withdrawn_at is None and not ends <= {Status.REJECTED, Status.CANCELLED}
 
@@ -80,12 +80,11 @@ def can_be_withdrawn(submission: Submission) -> bool:
 
 
 def has_intervals(progress: Progress) -> bool:
-    """Whether any value has one."""
     return any(interval.low is not None for interval in progress.intervals.values())
 
 
 def awaits_intervals(submission: Submission, progress: Progress, *, now: datetime) -> bool:
-    """Whether the intervals of a scored submission are about to come. Always False `AWAITED_FOR` later."""
+    """Tell whether the intervals of a scored submission are expected, until `AWAITED_FOR` later."""
     if not _is_on_board(submission, progress) or has_intervals(progress) or progress.finished_at is None:
         return False
     if now - progress.finished_at >= AWAITED_FOR:
@@ -95,7 +94,7 @@ def awaits_intervals(submission: Submission, progress: Progress, *, now: datetim
 
 
 def why_no_intervals(submission: Submission, progress: Progress, *, now: datetime) -> str:
-    """Why a scored submission has no confidence intervals, in a sentence; else empty."""
+    """Say why a scored submission has no confidence intervals; else empty."""
     if not _is_on_board(submission, progress) or has_intervals(progress):
         return ""
     if awaits_intervals(submission, progress, now=now):
@@ -108,7 +107,7 @@ def why_no_intervals(submission: Submission, progress: Progress, *, now: datetim
 def published_intervals(
     progress: Progress, position: BoardPosition | None
 ) -> Mapping[str, ConfidenceInterval]:
-    """The confidence intervals of the values, and rank ranges if it is a row of the present board."""
+    """Return the confidence intervals, and rank ranges if it is a row of the present board."""
     return position.intervals if position else _without_ranges(progress.intervals)
 
 
@@ -176,7 +175,6 @@ def _position(
 
 
 def _best_of(methods: Iterable[UUID], editions: Iterable[Edition]) -> set[UUID]:
-    """The best submission of each of these methods in each of these editions."""
     best: dict[tuple[int, UUID], UUID] = {}
     rows = _entry_in(editions).filter(evaluation__submission__method__in=methods)
     for edition, method, submission in rows.values_list(
@@ -187,7 +185,7 @@ def _best_of(methods: Iterable[UUID], editions: Iterable[Edition]) -> set[UUID]:
 
 
 def _entry_in(editions: Iterable[Edition]) -> QuerySet[Score]:
-    """The MiD scores in these editions, best first, of two alike the earlier."""
+    """Return the MiD scores in these editions, best first, then earliest."""
     return Score.objects.filter(
         evaluation__edition__in=list(editions),
         evaluation__status=Status.SCORED,
@@ -201,7 +199,7 @@ def _entry_in(editions: Iterable[Edition]) -> QuerySet[Score]:
 
 
 def teams_best_other(submission: Submission, position: BoardPosition) -> Entry | None:
-    """The team's best other entry on the same board, private ones included."""
+    """Return the team's best other entry on the same board, private ones included."""
     others = _entry_in([position.edition]).filter(
         evaluation__submission__method__team=submission.method.team_id
     )
@@ -225,7 +223,7 @@ def teams_best_other(submission: Submission, position: BoardPosition) -> Entry |
 
 
 def nearest_published(progress: Progress, position: BoardPosition) -> Entry | None:
-    """The row printed in a paper whose MiD is nearest; of two as near the better one."""
+    """Return the published result with the nearest MiD; of two as near the better one."""
     mid = (progress.scores or {}).get(PRIMARY)
     near = [
         (abs(value - mid), value, row)

@@ -1,4 +1,4 @@
-"""How far a submission is: its state, its position in the queue, its scores or problems."""
+"""The state of a submission: position in the queue, scores or problems."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -45,7 +45,7 @@ class Progress:
 
 
 def evaluation_of(submission: Submission) -> Evaluation:
-    """The evaluation shown for a submission: in the published edition, else the latest, drafts last."""
+    """Return the evaluation in the published edition, else the latest, drafts last."""
     published = submission.split.current_edition_id
     evaluations = sorted(submission.evaluations.all(), key=_edition_order)
     return next((e for e in evaluations if e.edition_id == published), evaluations[-1])
@@ -61,7 +61,6 @@ def _edition_order(evaluation: Evaluation) -> tuple[bool, int]:
 
 
 def progress_of(submission: Submission) -> Progress:
-    """How far a submission is, and what came of it."""
     evaluation = evaluation_of(submission)
     report = evaluation.report or {}
     rules, counts, truncated = evaluation.edition.rules, report.get("counts", {}), report.get("truncated", {})

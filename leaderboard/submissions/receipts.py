@@ -1,4 +1,4 @@
-"""Score receipts: what a submission scored in one edition, signed with the site's key."""
+"""Score receipts: the scores of a submission in one edition, signed with the site's key."""
 
 from collections.abc import Sequence
 from typing import Any, Final
@@ -17,7 +17,7 @@ MEDIA_TYPE: Final = "application/jwt"
 
 
 def receipt(*, submission: Submission, edition_number: int | None = None) -> str:
-    """The signed receipt of a submission, in that edition or the present one. Raises `Refused`."""
+    """Sign the receipt of a submission, in that edition or the present one. Raises `Refused`."""
     evaluation = _scored(submission, edition_number)
     edition, rules = evaluation.edition, evaluation.edition.rules
     scores = flat_scores(evaluation)
@@ -64,12 +64,12 @@ def _scored(submission: Submission, edition_number: int | None) -> Evaluation:
 
 
 def private_key() -> bytes:
-    """The seed that receipts are signed with."""
+    """Return the seed that receipts are signed with."""
     return _key("TSTTC_RECEIPT_KEY", settings.RECEIPT_KEY)
 
 
 def public_keys() -> dict[str, Any]:
-    """The key set that the site publishes: the present key first, then those of former days."""
+    """Return the published key set: the present key first, then former ones."""
     former = [_key("TSTTC_RECEIPT_OLD_KEYS", text) for text in settings.RECEIPT_OLD_KEYS]
     return receipts.key_set([receipts.public_key(private_key()), *former])
 
@@ -88,7 +88,6 @@ def _key(name: str, text: str) -> bytes:
 
 
 def check_keys(app_configs: Sequence[Any] | None = None, **kwargs: Any) -> list[CheckMessage]:
-    """Django's system check of the keys."""
     try:
         public_keys()
     except ImproperlyConfigured as fault:

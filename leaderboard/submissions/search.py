@@ -19,7 +19,7 @@ def matching(
     state: str = "",
     method: UUID | None = None,
 ) -> "QuerySet[Submission]":
-    """The submissions among `rows` that fit all that is given."""
+    """Filter submissions by all that is given."""
     if text:
         named = Q(method__name__icontains=text) | Q(filename__icontains=text) | Q(note__icontains=text)
         rows = rows.filter(named)

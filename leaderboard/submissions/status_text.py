@@ -1,4 +1,4 @@
-"""Sentences about the end of scoring; pages ask for them, so this module computes nothing."""
+"""Sentences about the end of scoring; this module computes nothing."""
 
 from evaluator.counting import counted
 from leaderboard.models import Evaluation, Status
@@ -6,7 +6,7 @@ from leaderboard.queue import lifecycle
 
 
 def sentence_of(evaluation: Evaluation) -> str:
-    """The cause of a failure or delay, or what happens now, in a sentence; else empty."""
+    """Word the cause of a failure or delay, or what happens now; else empty."""
     n_failed = evaluation.n_poison_strikes + evaluation.n_infrastructure_strikes
     match evaluation.status:
         case Status.REJECTED if evaluation.kept_in is not None:
@@ -28,7 +28,6 @@ def sentence_of(evaluation: Evaluation) -> str:
 
 
 def _of_system_error(evaluation: Evaluation, *, n_failed: int) -> str:
-    """Why scoring was given up."""
     counts = " Until then it counts as a rejected file for 24 hours." if evaluation.is_file_suspect else ""
     if evaluation.is_file_suspect and evaluation.n_poison_strikes < lifecycle.MAX_POISON_STRIKES:
         # Given up before its strikes were exhausted.

@@ -1,8 +1,4 @@
-"""Jobs of low priority: count changed labels, compare, compute intervals, analyse.
-
-Nobody needs to be told: each kind of work is found in the database. A live submission never waits behind it
-for longer than a fraction of a second.
-"""
+"""Jobs of low priority, found in the database: count changed labels, compare, compute intervals, analyse."""
 
 import random
 from collections.abc import Callable, Iterable
@@ -30,9 +26,9 @@ class Stopping(Exception):
 
 
 def work_off(*, now: datetime, rng: random.Random, is_stopping: Callable[[], bool] = lambda: False) -> int:
-    """Do what waits and this worker has the values for. Returns how much was done.
+    """Do the waiting jobs that this worker has the values for. Returns how many.
 
-    What fails is logged and left for the next time, and keeps nothing else from being done.
+    What fails is logged and left for the next time.
     """
     between = partial(_yield_to_live_work, rng=rng, is_stopping=is_stopping)
     try:
@@ -72,7 +68,7 @@ def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[
 
 
 def _yield_to_live_work(*, rng: random.Random, is_stopping: Callable[[], bool]) -> None:
-    """Decide waiting submissions first: their users watch a page for it."""
+    """Decide waiting submissions first: users wait for them."""
     while not is_stopping() and worker.run_next(rng=rng):
         pass
     if is_stopping():

@@ -1,8 +1,4 @@
-"""Sweep and pollers: every worker looks for work by itself.
-
-The broker makes things fast; these make them certain. A lost message, or a flushed or absent broker, delays
-scoring by seconds.
-"""
+"""Sweep and pollers: every worker looks for work by itself, so a lost message delays scoring by seconds."""
 
 import random
 import threading
@@ -37,9 +33,9 @@ log = structlog.get_logger(__name__)
 
 
 def poll(*, rng: random.Random, stopping: threading.Event) -> int:
-    """Take back what dead workers hold, then decide what waits until nothing does, or until `stopping`.
+    """Take back expired leases, decide what waits until `stopping`, then do low-priority jobs.
 
-    Then what waits behind submissions. Returns how often one was decided.
+    Returns how many evaluations were decided.
     """
     n_decided = 0
     lifecycle.release_expired(rng=rng)
@@ -51,10 +47,7 @@ def poll(*, rng: random.Random, stopping: threading.Event) -> int:
 
 
 def keep_up(*, rng: random.Random, stopping: threading.Event) -> None:
-    """Sweep, send mails and clean, each when it is due and no other process has begun to.
-
-    Mails and cleaning may wait for a server that is slow; the next sweep is then another process's.
-    """
+    """Sweep, send mails and clean, each when it is due and no other process has begun to."""
     SweepBeat.objects.get_or_create(pk=SweepBeat.THE_ONE)
     if _begun("sweep_begun_at", every_s=settings.SWEEP_S):
         sweep(rng=rng)
@@ -68,17 +61,14 @@ def keep_up(*, rng: random.Random, stopping: threading.Event) -> None:
 
 
 def _begun(field: str, *, every_s: float) -> bool:
-    """Whether it is due and this process is the one to do it: of all that ask at once, one."""
+    """Claim a due task for this process by compare-and-set."""
     due = SweepBeat.objects.filter(Q(**{field: None}) | Q(**{f"{field}__lte": clock.after(-every_s)}))
     # Looked at first: an update, also one of no row, waits for SQLite's one writer.
     return due.exists() and bool(due.update(**{field: Now()}))
 
 
 def sweep(*, rng: random.Random) -> None:
-    """Take back what dead workers hold, and do what is due by the clock.
-
-    A worker that cannot read the ground truth of what waits leaves it to others, and says so.
-    """
+    """Take back expired leases, and do what is due by the clock."""
     lifecycle.release_expired(rng=rng)
     visibility.reveal_due(now=clock.database_now())
     board_versions.bump_passed_deadlines(now=clock.database_now())
@@ -93,10 +83,7 @@ def sweep(*, rng: random.Random) -> None:
 
 
 def clean(*, now: datetime) -> None:
-    """Remove expired rows and orphaned files. Several workers may do it at once.
-
-    Raises `OSError` if the store does not answer; what was removed until then stays removed.
-    """
+    """Remove expired rows and orphaned files; safe in several workers. Raises `OSError` of the store."""
     outbox.purge(now=now)
     mailboxes.delete_expired(now=now)
     forgetting.delete_late_rows()
@@ -117,7 +104,7 @@ def clean(*, now: datetime) -> None:
 
 
 class Poller(threading.Thread):
-    """Does something every few seconds, whether or not a message came, with new connections each time."""
+    """Does something every few seconds, with new database connections each time."""
 
     def __init__(self, act: Callable[..., object], *, every_s: float, rng: random.Random) -> None:
         super().__init__(name=act.__name__, daemon=True)
@@ -127,7 +114,6 @@ class Poller(threading.Thread):
         self._stopping = threading.Event()
 
     def run(self) -> None:
-        """Do it again and again, until stopped."""
         while not self._stopping.wait(self._every_s * self._rng.uniform(0.8, 1.2)):
             try:
                 self._act(rng=self._rng, stopping=self._stopping)
@@ -140,15 +126,11 @@ class Poller(threading.Thread):
                 connections.close_all()
 
     def stop(self) -> None:
-        """Begin nothing more."""
         self._stopping.set()
 
 
 def start_pollers(*, rng: random.Random) -> Sequence[Poller]:
-    """Let this process look for work and keep up what is to be kept up, by itself.
-
-    Two threads, so that a long run keeps nothing from being swept.
-    """
+    """Start two threads, so that a long run does not delay the sweep."""
     pollers = (
         Poller(poll, every_s=settings.POLL_S, rng=rng),
         Poller(keep_up, every_s=settings.SWEEP_S / 3, rng=rng),
