@@ -15,13 +15,13 @@ from leaderboard.people import second_factor, tokens
 
 
 class BearerAuthentication(TokenAuthentication):
-    """`Authorization: Bearer tsttc_…`, and nowhere else. Checks the token's limits before any view.
+    """`Authorization: Bearer tsttc_…` alone. Checks the token's limits before any view.
 
     Safe methods need the scope `read` and all others `submit`, unless the view has `token_scopes`.
     """
 
     def authenticate(self, request: Request) -> tuple[User, ApiToken] | None:
-        """The user and the token. Raises `AuthenticationFailed`, or `PermissionDenied` beyond its limits."""
+        """Return user and token. Raises `AuthenticationFailed`, or `PermissionDenied` beyond its limits."""
         user_and_token: tuple[User, ApiToken] | None = super().authenticate(request)
         if user_and_token is not None:
             view = request.parser_context["view"]
@@ -32,7 +32,6 @@ class BearerAuthentication(TokenAuthentication):
         return user_and_token
 
     def authenticate_credentials(self, token: bytes) -> tuple[User, ApiToken]:
-        """The token's owner and the token. Raises `AuthenticationFailed`."""
         try:
             row = tokens.use(secret=token.decode("latin-1"), now=timezone.now())
         except tokens.UnusableToken as fault:
@@ -42,7 +41,7 @@ class BearerAuthentication(TokenAuthentication):
 
 
 class IsMaintainer(BasePermission):
-    """Lets maintainers in, where they must give a code with a session that has given one."""
+    """Lets maintainers in, after a second factor where it is required."""
 
     def has_permission(self, request: Request, view: Any) -> bool:
         return isinstance(request.user, User) and request.user.acts_as_maintainer
@@ -68,13 +67,11 @@ def require_split(token: object, split_name: str) -> None:
 
 
 def split_of(token: object) -> str | None:
-    """The only split that a request's token is valid for; None without such a limit."""
+    """Return the only split that a request's token is valid for, if limited."""
     return token.split_id if isinstance(token, ApiToken) else None
 
 
 class BearerScheme(OpenApiAuthenticationExtension):
-    """How the schema describes bearer tokens."""
-
     target_class = BearerAuthentication
     name = "bearer"
 

@@ -1,4 +1,4 @@
-"""Exceptions of the API, and how each becomes a problem document (RFC 9457 `application/problem+json`)."""
+"""Exceptions of the API, and the problem document (RFC 9457) of each."""
 
 from typing import Any, NoReturn
 
@@ -33,14 +33,14 @@ class BadValue(Exception):
 
 
 def whole_number(text: str, *, name: str, code: str, limits: range, expected: str) -> int:
-    """A parameter that is a whole number within limits. Raises `BadValue`."""
+    """Parse a whole number within limits. Raises `BadValue`."""
     if not (text.isascii() and text.isdecimal() and len(text) < 10 and int(text) in limits):
         raise BadValue(code, name, text, expected)
     return int(text)
 
 
 def edition_number(text: str) -> int:
-    """The parameter `edition`. Raises `BadValue`."""
+    """Parse the parameter `edition`. Raises `BadValue`."""
     return whole_number(
         text, name="edition", code="bad-edition", limits=range(10**9), expected="the number of an edition"
     )
@@ -49,7 +49,7 @@ def edition_number(text: str) -> int:
 def problem(
     *, status: int, code: str, detail: str, where: str = "", headers: dict[str, str] | None = None
 ) -> Response:
-    """The response with one problem."""
+    """Answer with one problem."""
     return Response(
         problem_codes.document(status=status, code=code, detail=detail, where=where),
         status=status,
@@ -59,7 +59,7 @@ def problem(
 
 
 def exception_handler(exc: Exception, context: dict[str, Any]) -> Response | None:
-    """The problem document of an exception; one failed authentication too many from an address is a 429."""
+    """Make the problem document of an exception; too many failed authentications are a 429."""
     if isinstance(exc, UNAUTHORIZED):
         # Such a request ends before the throttles of its view are asked.
         throttle = UnauthorizedThrottle()
@@ -120,7 +120,6 @@ def _not_yet(exc: usage.QuotaExceeded | questions.AskedTooOften) -> Response:
 
 
 def _bad_request(exc: Exception) -> Response | None:
-    """Problems of a request that no domain function has seen yet."""
     if isinstance(exc, BadValue):
         return problem(status=400, code=exc.code, detail=str(exc), where=exc.where)
     if isinstance(exc, RequestDataTooBig):
@@ -164,11 +163,11 @@ def _sentence(exc: Exception) -> str:
 
 
 class NowhereView(APIView):
-    """Any other path below /api/: a 404 as a problem document, not as a page."""
+    """Answers other paths below /api/ by a 404 as a problem document."""
 
     permission_classes = [AllowAny]
     schema = None
 
     def initial(self, request: Request, *args: Any, **kwargs: Any) -> NoReturn:
-        """Answer before authentication and throttling."""
+        # Before authentication and throttling.
         raise Http404

@@ -13,13 +13,10 @@ Next = Callable[[HttpRequest], HttpResponse]
 
 
 class ApiHeadersMiddleware:
-    """Set the headers of responses below /api/."""
-
     def __init__(self, get_response: Next) -> None:
         self._get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponse:
-        """The response with its headers."""
         response = self._get_response(request)
         if not request.path.startswith("/api/"):
             return response
@@ -40,7 +37,7 @@ def _remaining(throttle: ApiThrottle) -> str:
 
 
 def _conditional(request: HttpRequest, response: HttpResponse) -> HttpResponse:
-    """The response with an ETag, or 304 if the client has that already; files have an ETag of their own."""
+    """Add an ETag, or answer 304; files have an ETag of their own."""
     if request.method not in {"GET", "HEAD"} or response.status_code != 200 or response.streaming:
         return response
     if not response.has_header("ETag"):

@@ -1,7 +1,4 @@
-"""Pagination by row: `limit` rows after the row named by `after`, and a `Link` to the next page.
-
-A page begins after a row and not at an offset, so new rows do not shift it.
-"""
+"""Pagination: `limit` rows after the row `after`, and a `Link` to the next page; new rows do not shift it."""
 
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -38,7 +35,7 @@ class Page(Generic[Row]):
 
 
 def page_of(rows: QuerySet[Row], request: Request, *, order: str) -> Page[Row]:
-    """The page of `rows` that is asked for, ordered by a column (descending with `-`). Raises `BadValue`."""
+    """Return a page of `rows`, ordered by a column (descending with `-`). Raises `BadValue`."""
     limit = whole_number(
         request.query_params.get("limit", str(MOST)),
         name="limit",

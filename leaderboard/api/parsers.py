@@ -1,4 +1,4 @@
-"""The parser and renderer of JSON: robust against hostile documents, one form for all clients."""
+"""The parser and renderer of JSON."""
 
 import io
 from collections.abc import Mapping
@@ -13,8 +13,6 @@ MAX_BYTES: Final = 100_000
 
 
 class BodyTooLarge(exceptions.APIException):
-    """The document is larger than any that the API expects."""
-
     status_code = 413
     default_code = "too_large"
     default_detail = f"The document is too large; expected at most {MAX_BYTES:,} bytes."
@@ -29,7 +27,6 @@ class LimitedJSONParser(JSONParser):
         media_type: str | None = None,
         parser_context: Mapping[str, Any] | None = None,
     ) -> Any:
-        """The document. Raises `ParseError` or `BodyTooLarge`."""
         data = stream.read(MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
             raise BodyTooLarge
@@ -40,7 +37,6 @@ class LimitedJSONParser(JSONParser):
 
 
 class UniformJSONRenderer(JSONRenderer):
-    """JSON in one form, whatever indent `Accept` asks for: responses are cached for all clients."""
-
+    # Responses are cached for all clients, whatever indent `Accept` names.
     def get_indent(self, accepted_media_type: str, renderer_context: Mapping[str, Any]) -> None:
-        """None."""
+        pass

@@ -61,6 +61,5 @@ class FileView(APIView):
 
 
 def _own(request: Request, submission_id: str) -> Submission:
-    """A submission of the user's own team. Raises `Http404`."""
     rows = visible(request).filter(method__team__memberships__user=cast("User", request.user))
     return get_object_or_404(rows, pk=submission_id)

@@ -1,4 +1,4 @@
-"""The schema, and what all operations share in it: errors, headers and path parameters."""
+"""The schema, and what all operations share: errors, headers and path parameters."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -50,17 +50,17 @@ PATH_PARAMETERS: Mapping[str, str] = {
 
 
 def errors(*statuses: int) -> dict[tuple[int, str], type[ErrorSerializer]]:
-    """The problem documents that an operation answers with these statuses, for `extend_schema`."""
+    """Return the problem documents of these statuses, for `extend_schema`."""
     return {(status, problem_codes.MEDIA_TYPE): ErrorSerializer for status in statuses}
 
 
 def response_header(name: str, of: type, description: str, *, statuses: list[int | str]) -> OpenApiParameter:
-    """A header of an operation's responses with these statuses, for `extend_schema`."""
+    """Return a header of the responses with these statuses, for `extend_schema`."""
     return OpenApiParameter(name, of, OpenApiParameter.HEADER, description=description, response=statuses)
 
 
 def complete(result: Node, generator: Any, **kwargs: Any) -> Node:
-    """A drf-spectacular hook: add the answers and headers that no view declares."""
+    """Add the answers and headers that no view declares (a hook of drf-spectacular)."""
     components = result["components"]
     components["headers"] = {
         name: {"description": about, "schema": {"type": "string"}} for name, about in HEADERS.items()
@@ -84,7 +84,6 @@ def _headers(status: str) -> Node:
 
 
 def _complete(responses: Node, *, has_body: bool) -> None:
-    """Add headers to the declared answers, and references to the shared ones."""
     shared = {**ALWAYS, **(WITH_A_BODY if has_body else {})}
     for status, response in responses.items():
         response.setdefault("headers", {}).update(_headers(status))
@@ -109,7 +108,7 @@ class SchemaView(SpectacularAPIView):
         )
 
     def handle_exception(self, exc: Exception) -> Response:
-        """A problem document is JSON whatever form of the schema the request accepts."""
+        # A problem document is JSON whatever form of the schema the request accepts.
         self.request.accepted_renderer = UniformJSONRenderer()
         return super().handle_exception(exc)
 

@@ -64,7 +64,7 @@ class NamedSerializer(serializers.Serializer[Any]):
         return {name: self.child(name, required=name in common) for name in self.known()}
 
     def to_representation(self, instance: Mapping[str, Any]) -> dict[str, Any]:
-        """What there is, in the order of the fields."""
+        # In the order of the fields.
         return {
             name: None if instance[name] is None else field.to_representation(instance[name])
             for name, field in self.fields.items()
@@ -334,7 +334,7 @@ class EntrySerializer(serializers.Serializer[Entry]):
         return entry.pseudonym or None
 
     def to_representation(self, instance: Entry) -> dict[str, Any]:
-        """The row; its confidence intervals, most of its bytes, only if requested."""
+        # Confidence intervals are most of the bytes.
         row = instance if self.context.get("has_intervals") else replace(instance, intervals={})
         return super().to_representation(row)
 
@@ -375,5 +375,5 @@ class BoardSerializer(serializers.Serializer[Board]):
 
 
 def absolute(name: str, *args: object) -> str:
-    """The quotable address of a named page."""
+    """Return the permanent address of a named page."""
     return settings.SITE_URL + reverse(name, args=[str(arg) for arg in args])

@@ -105,7 +105,6 @@ class SubmissionView(APIView):
 
 
 def _submission_request(request: Request, form: QueryDict, *, now: datetime) -> intake.SubmissionRequest:
-    """The submission that a form of this request asks for."""
     user, upload = cast("User", request.user), request.FILES.get("file")
     return intake.SubmissionRequest(
         user=user,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # views make their classes with these
 
 
 def counted(request: HttpRequest) -> list["ApiThrottle"]:
-    """The throttles that counted this request, for the headers of its response; a list to append to."""
+    """Return the throttles that counted this request, a list to append to."""
     throttles: list[ApiThrottle] = request.__dict__.setdefault("_counted", [])
     return throttles
 
@@ -29,7 +29,7 @@ class ApiThrottle(rate_limits.Throttle):
 
 
 class SignedInThrottle(ApiThrottle):
-    """Requests of one account, whatever token it uses."""
+    """Requests of one account, with any token."""
 
     scope = "signed_in"
 
@@ -47,7 +47,7 @@ class VisitorThrottle(ApiThrottle):
 
 
 class SubmitThrottle(SignedInThrottle):
-    """Files sent by one account: also those that cost no quota are read and written."""
+    """Files of one account: also those that cost no quota are read and written."""
 
     scope = "submit"
     cache = cache
@@ -57,7 +57,7 @@ class SubmitThrottle(SignedInThrottle):
 
 
 class AsOfThrottle(ApiThrottle):
-    """Boards as of a time, which take long to read, of one account or one address."""
+    """Boards of the past, which take long to read, of one account or address."""
 
     scope = "as_of"
 
@@ -73,6 +73,6 @@ class RevokeThrottle(ApiThrottle):
 
 
 class UnauthorizedThrottle(ApiThrottle):
-    """Requests from one address that fail authentication, before the throttles above are asked."""
+    """Failed authentications from one address, checked first."""
 
     scope = "refused"

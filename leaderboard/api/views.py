@@ -25,14 +25,14 @@ from leaderboard.submissions import intake, outcomes
 
 
 def visible(request: Request) -> SubmissionQuerySet:
-    """The submissions visible to the user; with a token for one split only those to that split."""
+    """Return the submissions visible to the user, and to a token for one split."""
     rows = Submission.objects.visible_to(request.user).select_related("method__team", "split")
     only = split_of(request.auth)
     return rows.filter(split=only) if only is not None else rows
 
 
 def current_split(request: Request, name: str) -> Split:
-    """A split as the cache has it. Raises `Http404`."""
+    """Return a split from the cache. Raises `Http404`."""
     splits = snapshots.splits_of(request._request)
     match = next((split for split in splits if split.pk == name), None)
     if match is None:
@@ -41,7 +41,7 @@ def current_split(request: Request, name: str) -> Split:
 
 
 def published_edition(split: str | Split, number: int) -> Edition:
-    """A published edition. Raises `Http404`."""
+    """Return a published edition. Raises `Http404`."""
     return get_object_or_404(snapshots.editions(), split=split, number=number)
 
 

@@ -31,14 +31,13 @@ _SECTIONS = {
 
 
 def _board_split(request: HttpRequest) -> str:
-    """The split whose board the page is about; empty where it is about none that there is."""
     match = getattr(request, "resolver_match", None)
     name = match.kwargs.get("split", "") if match and _section(request) == "board" else ""
     return name if name and any(split.pk == name for split in splits_of(request)) else ""
 
 
 def site(request: HttpRequest) -> dict[str, Any]:
-    """The frame's context. The splits are asked for only by pages that list them."""
+    # Lazy: only some pages list the splits.
     return {
         "site_name": settings.SITE_NAME,
         "site_url": settings.SITE_URL,
@@ -54,9 +53,9 @@ def site(request: HttpRequest) -> dict[str, Any]:
 
 
 def _announcements(request: HttpRequest) -> list[tuple[str, str]]:
-    """The lines to show: that of the site without a title, and those of splits with the title of theirs.
+    """Return the site's announcement without a title, and those of splits with theirs.
 
-    A page of one split has the line of that one; the form has the line of each split beside it.
+    A page of one split has only its own; the form of submissions has each beside its split.
     """
     now, only = timezone.now(), _board_split(request)
     if _section(request) == "submit":

@@ -1,4 +1,4 @@
-"""Decorators of views: who gets the response, by which methods, and that nothing keeps it."""
+"""Decorators of views for signed-in users; nothing caches their answers."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -15,15 +15,13 @@ asks_first = require_http_methods(["GET", "HEAD", "POST"])
 
 
 def own_page(view: View) -> View:
-    """A page of the signed-in user, which nothing keeps."""
     return login_required(never_cache(require_safe(view)))
 
 
 def own_form(view: View) -> View:
-    """The same with a form."""
     return login_required(never_cache(asks_first(view)))
 
 
 def own_action(view: View) -> View:
-    """An action of the signed-in user, from a form on another page."""
+    """Decorate an action from a form on another page."""
     return login_required(never_cache(require_POST(view)))

@@ -12,7 +12,7 @@ SORRY = "This was an error on our side. We logged it; try again later."
 
 
 def server_error(request: HttpRequest) -> HttpResponse:
-    """Answer 503 or 507 where the cause is known, else 500; rendered without asking the database."""
+    """Answer 503 or 507 where the cause is known, else 500, without the database."""
     outage = outages.outage_of(sys.exception())
     status, code, sentence, headers = (
         (outage.status, outage.code, outage.sentence, outage.headers)
@@ -28,7 +28,6 @@ def server_error(request: HttpRequest) -> HttpResponse:
 
 
 def bad_request(request: HttpRequest, exception: Exception) -> HttpResponse:
-    """Django's handler of a request that is malformed before any view has seen it."""
     if not request.path.startswith("/api/"):
         return defaults.bad_request(request, exception)
     sentence = "The request is malformed or incomplete; expected a complete request, as the API describes it."

@@ -1,4 +1,4 @@
-"""How times, counts and sizes are written on every page."""
+"""Times, counts and sizes on every page."""
 
 from datetime import UTC, datetime
 
@@ -10,25 +10,17 @@ from evaluator.counting import counted
 
 
 def grouped(value: int | None) -> str:
-    """A count with its thousands set apart.
-
-    >>> grouped(28600)
-    '28,600'
-    """
+    """Group thousands, as 28,600."""
     return "" if value is None else f"{value:,}"
 
 
 def with_noun(value: int, nouns: str) -> str:
-    """A count and its noun; two nouns with a comma between them where an s does not make the plural.
-
-    >>> with_noun(1, "recording"), with_noun(3, "person,people")
-    ('1 recording', '3 people')
-    """
+    """Format a count and its noun, or one of two, as `person,people`."""
     return counted(value, *nouns.split(","))
 
 
 def signed(value: float, *, decimals: int = 2) -> str:
-    """A difference with its sign, and a minus that is one.
+    """Format a difference with its sign and a true minus.
 
     >>> signed(-4.1), signed(0.204), signed(-0.001), signed(-4.1, decimals=1)
     ('−4.10', '+0.20', '0.00', '−4.1')
@@ -40,7 +32,7 @@ def signed(value: float, *, decimals: int = 2) -> str:
 
 
 def size(n_bytes: int) -> str:
-    """A size in the largest fitting unit.
+    """Format a size in the largest fitting unit.
 
     >>> size(812), size(81_234), size(20_000_000)
     ('812 bytes', '81.2 KB', '20 MB')
@@ -51,7 +43,7 @@ def size(n_bytes: int) -> str:
 
 
 def duration(seconds: float | None) -> str:
-    """A span of time, as exactly as an estimate deserves.
+    """Format a span of time, as exactly as an estimate deserves.
 
     >>> duration(0.3), duration(41.8), duration(150), duration(9000)
     ('1 s', '42 s', '3 min', '3 h')
@@ -64,7 +56,7 @@ def duration(seconds: float | None) -> str:
 
 
 def ticked(text: str) -> SafeString:
-    """A sentence in which `names` are set in backticks, as HTML.
+    """Turn backticks into <code>.
 
     >>> ticked("The envelope has no `predictions`.")
     'The envelope has no <code>predictions</code>.'
@@ -75,32 +67,27 @@ def ticked(text: str) -> SafeString:
 
 
 def breakable(path: str) -> SafeString:
-    """A path that may go on in the next line after each of its slashes, as HTML.
-
-    >>> breakable("/api/v1")
-    '/<wbr>api/<wbr>v1'
-    """
+    """Let a path break after each slash, as HTML."""
     *folders, last = path.split("/")
     return format_html("{}{}", format_html_join("", "{}/<wbr>", ((part,) for part in folders)), last)
 
 
 def day(at: datetime) -> SafeString:
-    """The day, with time and zone on hover."""
+    """Format the day, with time and zone on hover."""
     return _time(at, "%Y-%m-%d")
 
 
 def moment(at: datetime) -> SafeString:
-    """Day and minute, with seconds and zone on hover."""
+    """Format day and minute, with seconds and zone on hover."""
     return _time(at, "%Y-%m-%d %H:%M UTC")
 
 
 def second(at: datetime) -> SafeString:
-    """Day, second and zone."""
     return _time(at, "%Y-%m-%d %H:%M:%S UTC")
 
 
 def clock(at: datetime) -> SafeString:
-    """The time of day to the second, with day and zone on hover."""
+    """Format the time to the second, with day and zone on hover."""
     return _time(at, "%H:%M:%S")
 
 

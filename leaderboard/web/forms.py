@@ -1,4 +1,4 @@
-"""The base of all forms: filled from a request, refused in the words of the domain function."""
+"""The base of all forms."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,15 +14,15 @@ _ADDRESS: Final = {"placeholder": "https://", "maxlength": 500}
 
 
 class SiteForm(forms.Form):
-    """A form of the site. Most checks are left to the function that the form is for."""
+    """A form of the site. Most checks are left to the domain function."""
 
     @classmethod
     def asked(cls, request: HttpRequest, **options: Any) -> Self:
-        """The form with what this request sends; with its initial values when it only asks for it."""
+        """Return the form with a request's data, or with its initial values."""
         return cls(request.POST if request.method == "POST" else None, **options)
 
     def refuse(self, refusal: Exception) -> None:
-        """Put the advice, or else the sentence, at the field that it is about, if it is one of these."""
+        """Put the advice, or else the message, at the field at fault."""
         field = getattr(refusal, "field", "")
         if field in self.fields:
             self.add_error(field, getattr(refusal, "advice", "") or str(refusal))
@@ -31,21 +31,19 @@ class SiteForm(forms.Form):
 
     @contextmanager
     def refusals(self) -> Iterator[None]:
-        """Put the sentence of a `Refused` on the form."""
+        """Show a `Refused` on the form."""
         try:
             yield
         except Refused as refusal:
             self.refuse(refusal)
 
     def query(self, **more: Any) -> str:
-        """The values that are given as the query of an address, with `more` in it."""
+        """Return the values as a query, with `more`."""
         asked = {**self.cleaned_data, **more}
         return urlencode({name: str(value) for name, value in asked.items() if value})
 
 
 class DescriptionForm(SiteForm):
-    """The description of a method and its links."""
-
     description = forms.CharField(
         required=False,
         help_text="One or two sentences: what the method does and which inputs it uses.",

@@ -1,4 +1,4 @@
-"""Lookups of views: the split of an address, and the page that a request comes from."""
+"""The split of an address, and the page that a request comes from."""
 
 from urllib.parse import urlsplit
 
@@ -18,7 +18,7 @@ def split_or_404(request: HttpRequest, name: str) -> Split:
 
 
 def page_before(request: HttpRequest) -> str:
-    """The address, without a host, of the page of this site that the request names as its origin."""
+    """Return the address, without a host, of the page of this site that the request came from."""
     address = request.headers.get("Referer", "")
     # The settings' host, and the one that was asked for, whatever it is: a demo also answers as localhost.
     hosts = {urlsplit(settings.SITE_URL).netloc, request.headers.get("Host", "")}

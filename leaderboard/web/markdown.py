@@ -1,8 +1,4 @@
-"""Markdown as HTML: headings with anchors, tables that scroll, and none of the writer's own markup.
-
-What looks like HTML in a text is shown as text. Used for the guides in `docs/` and for the pages that
-maintainers write.
-"""
+"""Markdown as HTML, with anchors and scrolling tables; HTML in a text is shown as text."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -25,7 +21,7 @@ _TABLE: Final = '<div class="scroll" tabindex="0" role="group" aria-label="Table
 
 @dataclass(frozen=True)
 class TextHeading:
-    """A heading: 1 is the title. Its anchor is what a link to it names."""
+    """A heading; level 1 is the title."""
 
     level: int
     text: str
@@ -34,7 +30,7 @@ class TextHeading:
 
 @dataclass(frozen=True)
 class Part:
-    """The plain text below one heading, its blocks of code last, for the search."""
+    """The plain text below one heading, blocks of code last, for the search."""
 
     heading: TextHeading
     text: str
@@ -42,26 +38,22 @@ class Part:
 
 @dataclass(frozen=True)
 class Document:
-    """A text as HTML, and its parts in order."""
-
     html: SafeString
     parts: tuple[Part, ...]
 
     @property
     def title(self) -> str:
-        """The heading of the first level; empty where there is none."""
         return next((part.heading.text for part in self.parts if part.heading.level == 1), "")
 
     @property
     def chapters(self) -> list[TextHeading]:
-        """The headings of the second level."""
         return [part.heading for part in self.parts if part.heading.level == 2]
 
 
 def guide(text: str, *, link: Target, image: Callable[[str], Mapping[str, str]]) -> Document:
-    """A text of the project's own.
+    """Render a guide of the project.
 
-    `link` says where an address in it leads, `image` which attributes the element of a picture has.
+    `link` returns the target of an address, `image` the attributes of a picture.
     """
     tokens = _parser(images=True).parse(text)
     for token in _inline(tokens):
@@ -76,13 +68,13 @@ def guide(text: str, *, link: Target, image: Callable[[str], Mapping[str, str]])
 
 
 def _linked(figure: Token) -> list[Token]:
-    """A figure that leads to itself, where it can be made larger."""
+    # A figure links to itself, where it can be enlarged.
     link: dict[str, str | int | float] = {"href": str(figure.attrs["src"]), "class": "figure"}
     return [Token("link_open", "a", 1, attrs=link), figure, Token("link_close", "a", -1)]
 
 
 def page(text: str) -> Document:
-    """A text that a maintainer wrote, for below the title of a page: no image, and no title of its own."""
+    """Render a text of a maintainer, without images and title."""
     parser = _parser(images=False)
     tokens = parser.parse(text)
     for token in tokens:
@@ -105,7 +97,7 @@ def _inline(tokens: Sequence[Token]) -> list[Token]:
 
 
 def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
-    """Give headings their anchors and tables their classes, and take the plain text of each part."""
+    """Add anchors of headings and classes of tables, and collect the plain text of each part."""
     parts: list[Part] = []
     heading, texts, code, anchors = TextHeading(0, "", ""), list[str](), list[str](), set[str]()
     for at, token in enumerate(tokens):
@@ -144,13 +136,13 @@ def _plain(token: Token) -> str:
 
 
 def _cell(token: Token) -> str:
-    """The text of a cell; a search shows a table as one line, where nothing else would tell them apart."""
+    # The search shows a table as one line: cells need a separator.
     words = _plain(token)
     return f"{words} ·" if any(map(str.isalnum, words)) else ""
 
 
 def _anchor(words: str, taken: set[str]) -> str:
-    """Return the anchor of a heading, as most programs that draw Markdown make it.
+    """Make the anchor of a heading, as most Markdown programs do.
 
     >>> _anchor("Who sees a method?", set()), _anchor("`check`", {"check"})
     ('who-sees-a-method', 'check_1')

@@ -34,28 +34,26 @@ KEPT_S = 1
 @never_cache
 @require_safe
 def healthz(request: HttpRequest) -> HttpResponse:
-    """The process answers; nothing else is asked."""
     return JsonResponse({"status": "alive"})
 
 
 @never_cache
 @require_safe
 def readyz(request: HttpRequest) -> HttpResponse:
-    """The database answers, so this process can serve; for a balancer that sends visitors elsewhere."""
+    """Tell a load balancer whether the database answers."""
     return _probe_response(lambda: (health.database(),), well="ready")
 
 
 @never_cache
 @require_safe
 def healthy(request: HttpRequest) -> HttpResponse:
-    """Database, broker, sweep and its findings; 503 if one fails that a person has to look after."""
+    """Check database, broker, sweep and its findings; 503 if one fails that needs a person."""
     return _probe_response(health.checks, well="healthy")
 
 
 @never_cache
 @require_safe
 def exposition(request: HttpRequest) -> HttpResponse:
-    """Return Prometheus metrics to those who may read them."""
     if not may_read_metrics(request):
         return _sentence("Metrics are for the operator's monitoring.", status=403)
     try:
@@ -82,7 +80,7 @@ def _sentence(text: str, *, status: int) -> HttpResponse:
 
 
 def may_read_metrics(request: HttpRequest) -> bool:
-    """Whether the token says so; without one set, a direct connection from a listed network."""
+    # Without a token, only direct connections from a listed network may.
     if settings.METRICS_TOKEN:
         sent = request.headers.get("Authorization", "").removeprefix("Bearer ").encode()
         return secrets.compare_digest(sent, settings.METRICS_TOKEN.encode())

@@ -1,8 +1,8 @@
-"""Accounts where allauth's own way says too much or locks out the wrong person.
+"""Accounts where allauth reveals too much or locks out the wrong person.
 
-Wrong passwords are counted by address, by account and address, and slowly by account alone, for guesses from
-many addresses. The last count does not hold where the account has signed in from before, so nobody locks out
-the owner. Sign-up hashes the password also where the address has an account, so that both take the same time.
+Wrong passwords are counted by address, by account and address, and slowly by account alone; the last does not
+hold where the account has signed in before, so nobody locks out the owner. Sign-up takes the same time for a
+known address.
 """
 
 import hashlib
@@ -34,7 +34,7 @@ KNOWN_ADDRESS_S = 90 * 24 * 3600
 
 
 class ConfiguredSite(RequestSite):
-    """The site as the settings name it, whatever `Host` a request names."""
+    """The site of the settings, whatever `Host` a request names."""
 
     def __init__(self) -> None:
         self.name = settings.SITE_NAME
@@ -49,7 +49,7 @@ class AccountAdapter(DefaultAccountAdapter):
     }
 
     def send_mail(self, template_prefix: str, email: str, context: dict[str, Any]) -> None:
-        """Send a mail whose links lead to the configured site, now or, if no server takes it, later."""
+        """Send a mail with links to the configured site, now or later."""
         links = {name: _on_our_site(value) for name, value in context.items() if _is_address(value)}
         given = {"request": allauth_context.request, "email": email, **context}
         message = self.render_mail(
@@ -58,14 +58,13 @@ class AccountAdapter(DefaultAccountAdapter):
         outbox.send_or_keep(message=message, now=timezone.now())
 
     def get_login_redirect_url(self, request: HttpRequest) -> str:
-        """Return the page after a sign-in that asked for none: for maintainers that of their tasks."""
         user = request.user
         if isinstance(user, User) and user.is_maintainer:
             return reverse("maintain")
         return str(super().get_login_redirect_url(request))
 
     def pre_authenticate(self, request: HttpRequest, **credentials: Any) -> None:
-        """Count one try. Raises allauth's validation error once there were too many wrong ones."""
+        """Count one try. Raises allauth's validation error after too many wrong ones."""
         super().pre_authenticate(request, **credentials)
         login = _login_of(credentials)
         if cache.get(known_address_key(login, ratelimit.get_ip(request))):
@@ -85,20 +84,20 @@ class AccountAdapter(DefaultAccountAdapter):
         return user
 
     def is_login_by_code_required(self, login: Login) -> bool:
-        """Whether a mailed code is needed: a maintainer's password alone must not set up a new app."""
+        # A maintainer's password alone must not set up a new app.
         user = login.user
         if not isinstance(user, User) or not second_factor.is_required(user):
             return False
         return not second_factor.is_set_up(user)
 
     def confirm_email(self, request: HttpRequest, email_address: EmailAddress) -> bool:
-        """Prove the address, unless its account has given way meanwhile."""
+        # An unconfirmed account may have given way meanwhile.
         with transaction.atomic():
             is_there = User.objects.select_for_update(no_key=True).filter(pk=email_address.user_id)
             return is_there.exists() and bool(super().confirm_email(request, email_address))
 
     def get_reauthentication_methods(self, user: User | AnonymousUser) -> list[dict[str, Any]]:
-        """By code alone where there is one: a known password shows no recovery codes."""
+        # By code alone where there is one: a known password shows no recovery codes.
         methods: list[dict[str, Any]] = super().get_reauthentication_methods(user)
         return [each for each in methods if each["id"] == "mfa_reauthenticate"] or methods
 
@@ -106,7 +105,7 @@ class AccountAdapter(DefaultAccountAdapter):
         return f"{_login_of(credentials)}:{ratelimit.get_ip(request)}"
 
     def _delete_login_attempts_cached_email(self, request: HttpRequest, **credentials: Any) -> None:
-        """A reset password opens the account again, from everywhere."""
+        # A reset password opens the account again, from everywhere.
         super()._delete_login_attempts_cached_email(request, **credentials)
         ratelimit.clear(
             request, app="allauth.account", action="login_failed_anywhere", key=_login_of(credentials)
@@ -114,7 +113,7 @@ class AccountAdapter(DefaultAccountAdapter):
 
 
 class OwnersAddress(forms.BaseSignupForm):
-    """A sign-up form that accepts an address that another account has, but has not proved."""
+    """A sign-up form that accepts an address that another account has not proved."""
 
     def validate_unique_email(self, value: str) -> str:
         if addresses.accounts_of(value).exists():
@@ -122,7 +121,6 @@ class OwnersAddress(forms.BaseSignupForm):
         return value
 
     def save(self, request: HttpRequest) -> User:
-        """Make the account; what had the address unproved gives way."""
         with transaction.atomic():
             addresses.release(address=self.cleaned_data["email"])
             user: User = super().save(request)
@@ -131,7 +129,7 @@ class OwnersAddress(forms.BaseSignupForm):
 
 class SignupForm(OwnersAddress, forms.SignupForm):
     def clean(self) -> dict[str, Any]:
-        """Tell of a bad password and of two that differ at once."""
+        # A bad password and two different ones are reported at once.
         cleaned: dict[str, Any] = super().clean()
         typed = [self.data.get(name) for name in ("password1", "password2")]
         if all(typed) and typed[0] != typed[1] and "password2" not in self.errors:
@@ -142,7 +140,6 @@ class SignupForm(OwnersAddress, forms.SignupForm):
         return cleaned
 
     def try_save(self, request: HttpRequest) -> Any:
-        """Make the account, or answer as if it had been made, after as much work."""
         if self.account_already_exists:
             make_password(self.cleaned_data["password1"])
         return super().try_save(request)
@@ -150,7 +147,7 @@ class SignupForm(OwnersAddress, forms.SignupForm):
 
 class ConfirmAddressForm(forms.ConfirmEmailVerificationCodeForm):
     def clean_code(self) -> Any:
-        """Return the code; the right one releases the address from accounts that have not proved it."""
+        # The right code releases the address from accounts that have not proved it.
         forms.BaseConfirmCodeForm.clean_code(self)
         if self.user is None:  # the account gave way, or there is none
             raise get_adapter().validation_error("incorrect_code")
@@ -160,7 +157,7 @@ class ConfirmAddressForm(forms.ConfirmEmailVerificationCodeForm):
 
 class ResetPasswordForm(forms.ResetPasswordForm):
     def clean_email(self) -> Any:
-        """Return the address; an unconfirmed account gets no mail: its maker may have another way in."""
+        # An unconfirmed account gets no mail: its maker may have another way in.
         address = super().clean_email()
         theirs = set(addresses.accounts_of(address))
         self.users = [user for user in self.users if user in theirs]  # type: ignore[has-type]  # allauth sets it here alone
@@ -172,7 +169,7 @@ def _login_of(credentials: dict[str, Any]) -> str:
 
 
 def known_address_key(login: str, address: str) -> str:
-    """Return the cache key of the mark that this address has signed in here before."""
+    """Return the cache key of the mark that this address has signed in here."""
     # A hash: who signs in from where is nobody's business in a table of the database.
     return "known-address:" + hashlib.sha256(f"{login}\n{address}".encode()).hexdigest()
 
@@ -197,7 +194,6 @@ class SecondFactorAdapter(DefaultMFAAdapter):
     }
 
     def get_totp_issuer(self) -> str:
-        """The name that the app shows: the site's, whatever `Host` a request names."""
         return str(settings.SITE_NAME)
 
     def can_delete_authenticator(self, authenticator: Authenticator) -> bool:

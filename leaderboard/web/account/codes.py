@@ -1,10 +1,9 @@
 """Codes of the second factor: guesses are limited, and a code works only once.
 
-Wrong codes are counted by account and address, so that a person who knows the password and guesses codes
-never locks out the owner at another address; and by account alone, for guesses from many addresses. The last
-count does not hold at an address where the account has given a right code before. So 50 guesses a day come
-from all unknown addresses together, and 50 from each known one. A guess is right with probability 1.1e-6 (one
-of a million codes of the app, ten of 1e8 recovery codes): with any number of addresses, 5.5e-5 a day.
+Wrong codes are counted by account and address, and by account alone. The last count does not hold at an
+address where the account has given a right code, so nobody locks out the owner. A guess is right with
+probability 1.1e-6 (one of a million codes, ten of 1e8 recovery codes): 50 a day from all unknown addresses
+give 5.5e-5 a day.
 """
 
 from typing import Any
@@ -26,7 +25,6 @@ from leaderboard.web.account.accounts import KNOWN_ADDRESS_S, known_address_key
 
 class _CountedCode(forms.BaseAuthenticateForm):
     def clean_code(self) -> str:
-        """Use the code up."""
         usage = _count_one(context.request, self.user)
         code: str = self.cleaned_data["code"]
         for each in Authenticator.objects.filter(user=self.user):
@@ -41,16 +39,16 @@ class _CountedCode(forms.BaseAuthenticateForm):
 
 
 class AuthenticateForm(_CountedCode, forms.AuthenticateForm):
-    """Asks for a code at sign-in."""
+    pass
 
 
 class ReauthenticateForm(_CountedCode, forms.ReauthenticateForm):
-    """Asks for a code once more."""
+    pass
 
 
 class ActivateForm(ActivateTOTPForm):
     def clean_code(self) -> Any:
-        """Use the code up, which allauth does with those of sign-ins alone."""
+        # allauth uses up the codes of sign-ins alone.
         code = super().clean_code()
         app = Authenticator(user=self.user, type=Authenticator.Type.TOTP)
         if not TOTP(app)._mark_code_used(code):

@@ -1,4 +1,4 @@
-"""A person's own data: what is kept about them, to download, and its deletion; and which mails they get."""
+"""A person's data: download, deletion, and the mails that they get."""
 
 from typing import Final, cast
 
@@ -22,8 +22,7 @@ from leaderboard.web.forms import SiteForm
 
 
 class DeleteForm(SiteForm):
-    """The address of the account once more, so that nobody deletes it by accident."""
-
+    # The address once more, so that nobody deletes the account by accident.
     email = forms.CharField(
         label="Email address of this account",
         max_length=254,
@@ -41,7 +40,6 @@ class DeleteForm(SiteForm):
 
 @own_form
 def data(request: HttpRequest) -> HttpResponse:
-    """Show which data is kept, how to download it, and the form that deletes it."""
     user = cast("User", request.user)
     form = DeleteForm.asked(request)
     if form.is_valid():
@@ -55,7 +53,7 @@ def data(request: HttpRequest) -> HttpResponse:
 
 @reauthentication_required
 def _forget(request: HttpRequest) -> HttpResponse:
-    """Delete the account once the person has confirmed who they are; an open session is not enough."""
+    # An open session is not enough: the person must confirm their identity.
     user = cast("User", request.user)
     forgetting.forget(user=user, reason="on their own page", actor=user, now=timezone.now())
     logout(request)

@@ -1,9 +1,8 @@
-"""Signing in with an account elsewhere: ORCID or GitHub, each where the settings name a client of it.
+"""Sign-in by ORCID or GitHub, each where the settings name a client of it.
 
-Of what a provider says, two things count: its number of the person, which never changes, and one address
-that it has verified. An address that it has not verified is dropped. An address that has an account here
-opens nothing: its owner signs in first, and then connects the two. What is kept is the number and, of
-GitHub, the login name.
+Of a provider's answer count its id of the person and one verified address. An address with an account here
+opens nothing: its owner signs in first, and then connects the two. Only the id and GitHub's login name are
+kept.
 """
 
 from collections.abc import Iterator, Mapping
@@ -40,7 +39,7 @@ log = structlog.get_logger(__name__)
 
 
 def patterns() -> list[URLPattern | URLResolver]:
-    """The addresses, below `/accounts/`, of the providers that are offered; none where there are none."""
+    """Return the addresses, below `/accounts/`, of the providers that are offered."""
     chosen = [pattern for name in settings.SOCIALACCOUNT_PROVIDERS for pattern in _PATTERNS[name]]
     return [path("3rdparty/", include("allauth.socialaccount.urls")), *chosen] if chosen else []
 
@@ -51,7 +50,7 @@ class MalformedAnswer(OAuth2Error):
 
 @contextmanager
 def _malformed_answers() -> Iterator[None]:
-    """Turn what allauth raises for an answer of an unexpected shape into an error of the provider."""
+    """Turn allauth's errors for unexpected answers into one of the provider."""
     try:
         yield
     except requests.RequestException:
@@ -68,8 +67,6 @@ def _malformed_answers() -> Iterator[None]:
 
 
 class _ProviderViews(OAuth2Adapter):
-    """The exchange with a provider, whose answers may have any shape."""
-
     def get_access_token_data(self, *args: Any, **kwargs: Any) -> Any:
         with _malformed_answers():
             return super().get_access_token_data(*args, **kwargs)
@@ -89,17 +86,15 @@ class _ProviderViews(OAuth2Adapter):
             return login
 
     def verified(self, login: SocialLogin) -> list[EmailAddress]:
-        """The addresses that the provider has verified, the primary one first."""
+        """Return the addresses that the provider has verified, the primary one first."""
         raise NotImplementedError
 
     def kept(self, profile: Mapping[str, Any]) -> dict[str, str]:
-        """Return what is kept of the provider's profile, next to its number of the person."""
+        """Return what is kept of the profile."""
         return {}
 
 
 class OrcidViews(_ProviderViews, OrcidOAuth2Adapter):
-    """ORCID tells the iD, and addresses that the person has made public."""
-
     def verified(self, login: SocialLogin) -> list[EmailAddress]:
         person = login.account.extra_data.get("person") or {}
         rows = (person.get("emails") or {}).get("email") or []
@@ -108,8 +103,6 @@ class OrcidViews(_ProviderViews, OrcidOAuth2Adapter):
 
 
 class GitHubViews(_ProviderViews, GitHubOAuth2Adapter):
-    """GitHub tells a number, the login name, and the addresses of the account."""
-
     def verified(self, login: SocialLogin) -> list[EmailAddress]:
         rows = [row for row in login.email_addresses if row.verified is True]
         return _sorted(_address(row.email, is_primary=row.primary is True) for row in rows)
@@ -127,7 +120,7 @@ def _sorted(addresses: Iterator[EmailAddress]) -> list[EmailAddress]:
 
 
 class ProviderAdapter(DefaultSocialAccountAdapter):
-    """Decides what a login of a provider opens, and says in words what went wrong."""
+    """Decides what a provider's login opens, and words its failures."""
 
     error_messages = {
         **DefaultSocialAccountAdapter.error_messages,
@@ -136,7 +129,7 @@ class ProviderAdapter(DefaultSocialAccountAdapter):
     }
 
     def pre_social_login(self, request: HttpRequest, sociallogin: SocialLogin) -> None:
-        """Stop where the address has an account that does not know this login."""
+        # Stop where the address has an account that is not connected.
         # It would wait in the session, and nobody needs it any more.
         sociallogin.token = None
         is_sign_in = sociallogin.state.get("process", AuthProcess.LOGIN) == AuthProcess.LOGIN
@@ -156,7 +149,7 @@ class ProviderAdapter(DefaultSocialAccountAdapter):
         exception: Exception | None = None,
         extra_context: dict[str, Any] | None = None,
     ) -> None:
-        """Find the sentence for the page. The log has the kind of error, nothing that the provider said."""
+        # The log has the kind of error, nothing that the provider said.
         if error == AuthError.CANCELLED:
             return
         log.warning("provider_failed", provider=provider.id, fault=type(exception).__name__)
@@ -180,10 +173,9 @@ def _sentence(name: str, exception: Exception | None, request: HttpRequest) -> s
 
 
 class ProviderSignupForm(OwnersAddress, SignupForm):
-    """Address and name. The address is taken as verified where it is the one that the provider verified."""
+    """Address and name; an address that the provider verified counts as proved."""
 
     def save(self, request: HttpRequest) -> User:
-        """Make the account."""
         typed = self.cleaned_data["email"].lower()
         addresses = self.sociallogin.email_addresses
         self.sociallogin.email_addresses = [each for each in addresses if each.email == typed]
@@ -192,7 +184,7 @@ class ProviderSignupForm(OwnersAddress, SignupForm):
 
 
 class ConnectedForm(DisconnectForm):
-    """The accounts that open this one, of the providers that the site offers at present."""
+    """Connected accounts of the providers that the site offers now."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         offered_here = settings.SOCIALACCOUNT_PROVIDERS

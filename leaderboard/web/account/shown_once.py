@@ -1,7 +1,7 @@
-"""A secret that is shown once: on the page that a browser is led to after the form that made it.
+"""A secret that is shown once, on the page after its form.
 
-Until then it is in a cookie that no script reads, that goes to this one page, is signed for this account, and
-ends when it was shown or after two minutes. Nothing here stores it, no address names it and no log has it.
+Until then it is in a cookie for this page alone: HttpOnly, signed for this account, for two minutes. It is in
+no table, address or log.
 """
 
 from typing import Any, Final, cast
@@ -20,7 +20,7 @@ LIFETIME_S: Final = 120
 
 @sensitive_variables("secret")
 def redirect_with(secret: str, *, request: HttpRequest, to: str) -> HttpResponse:
-    """Lead to the page of the route `to`, which `render_with` draws."""
+    """Redirect to the page of the route `to`, which `render_with` draws."""
     response = redirect(to)
     response.set_signed_cookie(
         COOKIE,
@@ -39,7 +39,7 @@ def redirect_with(secret: str, *, request: HttpRequest, to: str) -> HttpResponse
 def render_with(
     request: HttpRequest, template: str, context: dict[str, Any], *, at: str, status: int = 200
 ) -> HttpResponse:
-    """The page of the route `at`, with the `secret` that was made for it a moment ago, or an empty one."""
+    """Render the page of the route `at` with the new `secret`, if there is one."""
     secret = request.get_signed_cookie(COOKIE, default="", salt=_salt(request, at), max_age=LIFETIME_S)
     response = render(request, template, {**context, "secret": secret}, status=status)
     if COOKIE in request.COOKIES:

@@ -23,8 +23,6 @@ from leaderboard.web.forms import SiteForm
 
 
 class SignupNameForm(forms.Form):
-    """The name that sign-up asks for, next to address and password."""
-
     name = forms.CharField(
         label="Name shown on the board",
         max_length=80,
@@ -36,7 +34,7 @@ class SignupNameForm(forms.Form):
     field_order = ["email", "name", "password1", "password2"]
 
     def clean_name(self) -> str:
-        """The name as boards will show it; two teams whose names look alike get a number."""
+        # Two teams whose names look alike get a number.
         name: str = self.cleaned_data["name"]
         if not name.strip():
             return ""
@@ -51,8 +49,6 @@ class SignupNameForm(forms.Form):
 
 
 class NameForm(SiteForm):
-    """The team's name."""
-
     name = forms.CharField(
         help_text="Shown on the boards once your team has a public method. Names of teams on the boards "
         "must not look alike. You can change the name once a day.",
@@ -62,7 +58,7 @@ class NameForm(SiteForm):
 
 
 def _team_page(user: User, *, now: datetime) -> dict[str, Any]:
-    """The person's team, as they see it. Invitations are the owner's to see."""
+    # Only the owner sees invitations.
     team = teams.current_team_of(user=user)
     members = team.memberships.select_related("user").order_by("-is_owner", "joined_at", "pk") if team else ()
     is_owner = any(member.is_owner and member.user_id == user.pk for member in members)
@@ -108,7 +104,7 @@ def _done(request: HttpRequest, action: Callable[[], object], *, flash_message: 
 
 @own_form
 def team(request: HttpRequest) -> HttpResponse:
-    """Show the members and invitations of the team. A name that is sent founds the team, or renames it."""
+    """Show members and invitations; a posted name founds or renames the team."""
     if request.method != "POST":
         return _page(request)
     user = cast("User", request.user)
@@ -128,7 +124,6 @@ def team(request: HttpRequest) -> HttpResponse:
 @own_action
 @sensitive_variables("secret")
 def invite(request: HttpRequest) -> HttpResponse:
-    """Make a link. It is shown on the page of the team that follows, and never again."""
     own, now = _own_team(request), timezone.now()
     try:
         _, secret = invitations.make(team=own, actor=cast("User", request.user), now=now)
@@ -139,7 +134,6 @@ def invite(request: HttpRequest) -> HttpResponse:
 
 @own_action
 def revoke_invitation(request: HttpRequest, invitation_id: UUID) -> HttpResponse:
-    """End a link that nobody has used."""
     invitation = get_object_or_404(Invitation, team=_own_team(request), pk=invitation_id)
     user = cast("User", request.user)
     return _done(
@@ -151,7 +145,7 @@ def revoke_invitation(request: HttpRequest, invitation_id: UUID) -> HttpResponse
 
 @own_action
 def leave(request: HttpRequest) -> HttpResponse:
-    """Leave one's team; a last member with methods has to confirm it."""
+    """Leave one's team; the last member of a team with methods has to confirm it."""
     _own_team(request)
     user = cast("User", request.user)
     if _team_page(user, now=timezone.now())["would_be_lost"] and not request.POST.get("confirm"):
@@ -162,7 +156,6 @@ def leave(request: HttpRequest) -> HttpResponse:
 
 @own_action
 def remove(request: HttpRequest, handle: UUID) -> HttpResponse:
-    """Put a member out of the team."""
     own, member = _member(request, handle)
     return _done(
         request,
@@ -173,7 +166,6 @@ def remove(request: HttpRequest, handle: UUID) -> HttpResponse:
 
 @own_action
 def hand_over(request: HttpRequest, handle: UUID) -> HttpResponse:
-    """Let another member own the team."""
     own, member = _member(request, handle)
     return _done(
         request,
@@ -186,7 +178,7 @@ def hand_over(request: HttpRequest, handle: UUID) -> HttpResponse:
 @sensitive_variables("secret")
 @asks_first
 def join(request: HttpRequest, secret: str) -> HttpResponse:
-    """Show who invites and what joining means, and join the team; a visitor sees who invites."""
+    """Show the meaning of an invitation, and join; a visitor sees the inviter."""
     user, now = cast("User", request.user), timezone.now()
     try:
         invitation = invitations.find(secret=secret, now=now)

@@ -22,8 +22,6 @@ def _splits() -> list[tuple[str, str]]:
 
 
 class TokenForm(SiteForm):
-    """A token's name and limits. What is wrong with them the verb says."""
-
     name = forms.CharField(
         help_text="What it is for, such as “nightly CI”.",
         widget=forms.TextInput(attrs={"maxlength": 80, "autocomplete": "off"}),
@@ -53,7 +51,7 @@ class TokenForm(SiteForm):
 @own_form
 @sensitive_variables("secret")
 def token_page(request: HttpRequest) -> HttpResponse:
-    """List and make tokens. A new one is shown on the page after its form, and never again."""
+    """List and make tokens; a new one is shown once, on the next page."""
     user = cast("User", request.user)
     now = timezone.now()
     form = TokenForm.asked(request)
@@ -72,7 +70,6 @@ def token_page(request: HttpRequest) -> HttpResponse:
 
 @own_action
 def revoke(request: HttpRequest) -> HttpResponse:
-    """End one's own token at once."""
     user = cast("User", request.user)
     row = get_object_or_404(ApiToken, user=user, digest=request.POST.get("token", "").replace("\x00", ""))
     tokens.revoke(token=row, now=timezone.now(), actor=user)

@@ -1,4 +1,4 @@
-"""The query of a board's address (order, time, columns, filters, page), and the tools that set it."""
+"""The query of a board's address: order, time, columns, filters, page."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ _MAX_PAGE_DIGITS: Final = 6
 
 
 class BadView(ValueError):
-    """The address asks for columns or a page that there cannot be. `field` is the parameter's name."""
+    """A query with impossible columns or page. `field` is the parameter's name."""
 
     def __init__(self, field: str, sentence: str) -> None:
         super().__init__(sentence)
@@ -36,7 +36,7 @@ FAULTS: Final = (listing.UnknownColumn, listing.BadTime, filters.BadFilter, BadV
 
 @dataclass(frozen=True)
 class BoardQuery:
-    """One view of a board. `given` is what the address names, for links that keep it."""
+    """A view of a board. `given` has the parameters of the address, for links that keep them."""
 
     sort: str = "rank"
     at: datetime | None = None
@@ -46,7 +46,7 @@ class BoardQuery:
     given: Mapping[str, str] = field(default_factory=dict)
 
     def href(self, **changes: str) -> str:
-        """The address of the same view, with these changes (empty: left out), from its first page.
+        """Return the address of this view with changes (empty: left out), from its first page.
 
         >>> BoardQuery(given={"sort": "mid", "nerf": "no", "page": "2"}).href(sort="-mid")
         '?sort=-mid&nerf=no'
@@ -55,14 +55,14 @@ class BoardQuery:
         return "?" + urlencode({name: wanted[name] for name in NAMES if wanted.get(name)})
 
     def kept(self, *names: str) -> tuple[tuple[str, str], ...]:
-        """Return the parameters that a form for the others has to send along."""
+        """Return the parameters that a form for the others must send along."""
         return tuple((name, self.given[name]) for name in names if name in self.given)
 
 
 def forgiving(
     query: Mapping[str, str], *, now: datetime, has_time: bool = True
 ) -> tuple[BoardQuery, dict[str, str]]:
-    """The view that an address asks for but for what it gets wrong, and a sentence for each of these."""
+    """Parse a query without its faults; return a sentence for each of them as well."""
     left, faults = {name: query[name] for name in query}, dict[str, str]()
     while True:
         try:
@@ -73,9 +73,9 @@ def forgiving(
 
 
 def parse(query: Mapping[str, str], *, now: datetime, has_time: bool = True) -> BoardQuery:
-    """Return the view that an address asks for; other parameters are ignored.
+    """Parse a query; ignore other parameters. Raises one of `FAULTS`.
 
-    `has_time` is False for the board of an edition, which is as it is. Raises one of `FAULTS`.
+    `has_time` is False for the board of an edition.
     """
     given = {name: query[name].strip() for name in NAMES if query.get(name, "").strip()}
     at = listing.parse_time(given["at"]) if has_time and "at" in given else None
@@ -119,10 +119,9 @@ def tools(
     faults: Mapping[str, str],
     latest_day: date | None,
 ) -> dict[str, Any]:
-    """Return what is above this board: links of columns, and the form of the search and the filters.
+    """Return the links of columns, and the form of search and filters.
 
-    `asked` is the address' query, and `faults` what is wrong with it, by parameter. `latest_day` is the last
-    day as of which there is a board to be asked for; None where there is no other time.
+    `faults` are by parameter. `latest_day` is the last day with a board of the past, if any.
     """
     given = {name: asked.get(name, "").strip() for name in FILTERS}
     fields = [
@@ -169,12 +168,10 @@ def _words(name: str, text: str) -> str:
 
 
 def sentence(n_shown: int, n_in_all: int, *, is_filtered: bool) -> str:
-    """How many rows the filters let through, or how many there are.
+    """Count the rows shown and in all.
 
     >>> sentence(4, 12, is_filtered=True), sentence(0, 1200, is_filtered=True)
     ('4 of 12 results', 'No results among 1,200 rows')
-    >>> sentence(12, 12, is_filtered=False), sentence(1, 1, is_filtered=False)
-    ('12 results', '1 result')
     """
     if not is_filtered:
         return counted(n_in_all, "result")

@@ -1,4 +1,4 @@
-"""The page of a board, now, as of a time, or of one edition, and the list of editions."""
+"""Pages of a board, now, as of a time, or of one edition, and the list of editions."""
 
 from dataclasses import replace
 from typing import Any
@@ -24,7 +24,6 @@ MAIN_SPLIT = "test"
 
 @require_safe
 def board(request: HttpRequest, split: str) -> HttpResponse:
-    """A split's board, in the order that `?sort=` asks for, now or as it stood `?at=` a time."""
     split_row = split_or_404(request, split)
     # Asked for only by a page that tells it: a board of the past does not.
     news = SimpleLazyObject(lambda: edition_tables.news(split_row))
@@ -34,9 +33,9 @@ def board(request: HttpRequest, split: str) -> HttpResponse:
 def draw_board(
     request: HttpRequest, template: str, *, split: Split, edition: Edition | None = None, **more: Any
 ) -> HttpResponse:
-    """A board as its address asks for it; an edition's has no other time.
+    """Draw a board as its address says; an edition's has no other time.
 
-    What the address gets wrong is left out and said, at its field where it has one: nothing else is lost.
+    A fault of the address is left out and said at its field.
     """
     now = timezone.now()
     query, faults = board_query.forgiving(request.GET, now=now, has_time=edition is None)
@@ -63,7 +62,7 @@ def draw_board(
 def _shown(
     request: HttpRequest, split: Split, edition: Edition | None, query: BoardQuery, faults: dict[str, str]
 ) -> tuple[Board, BoardQuery]:
-    """The board, in the order of its ranks where its protocol lacks the column that was asked for."""
+    # In the order of ranks where its protocol lacks the sort column.
     try:
         board = snapshots.board(
             split=split,
@@ -82,7 +81,6 @@ def _shown(
 
 @require_safe
 def editions(request: HttpRequest, split: str) -> HttpResponse:
-    """List every edition that ever was a split's board, and why each became it."""
     split_row = split_or_404(request, split)
     log = history.changelog(split_row)
     rows = [(past, edition_tables.past_change(past)) for past in history.history(split_row, log)]
@@ -93,7 +91,6 @@ def editions(request: HttpRequest, split: str) -> HttpResponse:
 
 @require_safe
 def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    """The board of one edition, for ever."""
     row = get_object_or_404(snapshots.editions(), split=split, number=number)
     past = history.record_of(row)
     return draw_board(

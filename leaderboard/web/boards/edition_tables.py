@@ -20,7 +20,7 @@ _STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}
 
 
 def truth_words(change: history.TruthChange | None) -> str:
-    """Return the difference of two ground truths in words; empty if nothing differs.
+    """Word the difference of two ground truths; empty for none.
 
     >>> truth_words(history.TruthChange(n_added=3, n_removed=0, n_changed=12, n_renumbered=0))
     '12 labels corrected, 3 sequences added'
@@ -39,7 +39,7 @@ def truth_words(change: history.TruthChange | None) -> str:
 
 
 def truth_choices(split: Split, truths: Sequence[GroundTruth]) -> tuple[tuple[GroundTruth, str], ...]:
-    """Ground truths, each with what differs from the board's, in words; "" for the board's own."""
+    """Return ground truths with their difference from the board's, in words; "" for the board's own."""
     board = split.current_edition.ground_truth if split.current_edition else None
     changes = (history.change_of_truth(board, truth) if board else None for truth in truths)
     words = (truth_words(change) if change else "not compared" for change in changes)
@@ -47,7 +47,6 @@ def truth_choices(split: Split, truths: Sequence[GroundTruth]) -> tuple[tuple[Gr
 
 
 def change_words(old: Edition, new: Edition) -> str:
-    """How one edition differs from another: in its labels, its sequences, its protocol."""
     return _change_words(history.change_of_truth(old.ground_truth, new.ground_truth), old, new)
 
 
@@ -58,7 +57,7 @@ def _change_words(change: history.TruthChange | None, old: Edition, new: Edition
 
 
 def news(split: Split) -> str:
-    """Return the last change of a board, for its head; empty while it has its first edition."""
+    """Word the last change of a board; empty for its first edition."""
     publication = history.latest_change(split)
     if publication is None or publication.replaced is None:
         return ""
@@ -69,12 +68,11 @@ def news(split: Split) -> str:
 
 
 def past_change(past: history.EditionRecord) -> str:
-    """Return the change from the edition that this one followed."""
     return _change_words(past.change, past.followed, past.edition) if past.followed else "the first"
 
 
 def rescored_notice(rescored: history.Rescored | None) -> dict[str, Any] | None:
-    """Return the effect of the board's last change on a submission; None where it had none."""
+    """Return the effect of the board's last change on a submission."""
     if rescored is None:
         return None
     old, new, publication = rescored.old, rescored.new, rescored.publication
@@ -118,7 +116,7 @@ def _mid(evaluation: Evaluation | None) -> str:
 
 
 def running(edition: Edition, progress: RescoringProgress) -> dict[str, Any]:
-    """Return how far the re-scoring of an edition is; a waiting page sends `seen` to ask what is new."""
+    """Return the progress of a re-scoring; a waiting page sends `seen` to ask for news."""
     parts = [f"{grouped(progress.n_done)} of {grouped(progress.n_total)}"]
     if progress.n_rejected:
         parts.append(f"{grouped(progress.n_rejected)} rejected")
@@ -140,7 +138,7 @@ def running(edition: Edition, progress: RescoringProgress) -> dict[str, Any]:
 
 
 def rate_words(rate_per_s: float) -> str:
-    """A rate in the unit in which it is more than one.
+    """Word a rate in the unit in which it is more than one.
 
     >>> rate_words(41.7), rate_words(0.25)
     ('41.7 per second', '15 per minute')
@@ -149,7 +147,7 @@ def rate_words(rate_per_s: float) -> str:
 
 
 def change_table(preview: Preview) -> dict[str, Any]:
-    """A preview, as the comparison's template places it."""
+    """Return the preview for the template."""
     return {
         "headings": [score_heading(name) for name in preview.names],
         "rows": [_change_row(change, preview.names) for change in preview.entries],
@@ -205,7 +203,7 @@ def _difference(name: str, change: Change) -> dict[str, str]:
 
 
 def delta_words(delta: float | None, *, decimals: int = 2) -> str:
-    """A difference with its sign.
+    """Format a difference with its sign.
 
     >>> delta_words(0.09), delta_words(-1.5), delta_words(0.0), delta_words(None)
     ('+0.09', '−1.50', '0.00', '')

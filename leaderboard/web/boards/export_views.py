@@ -1,7 +1,6 @@
-"""Exports of a board: the view of its page as CSV, LaTeX, Markdown and BibTeX.
+"""Exports of a board: its view as CSV, LaTeX, Markdown and BibTeX.
 
-They contain what everybody sees, for every user, since they end up in papers. `mine=1` adds the rows of
-one's own that others do not see, or not under their name, each marked.
+They have public rows for every reader, since they end up in papers; `mine=1` adds the team's own, marked.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -35,12 +34,9 @@ NOBODYS: Final = (
 
 
 class FormatConverter(StringConverter):
-    """The end of an address that names a format."""
-
     regex = "[a-z]+"
 
     def to_python(self, value: str) -> Format:  # type: ignore[override]  # Django takes any type
-        """The format of this suffix; ValueError, for Django, where there is none."""
         match = next((each for each in formats.FORMATS if each.suffix == value), None)
         if match is None:
             raise ValueError(value)
@@ -49,7 +45,6 @@ class FormatConverter(StringConverter):
 
 @require_safe
 def board(request: HttpRequest, split: str, chosen: Format) -> HttpResponse:
-    """The board of a split, as its page would show all of its rows."""
     if chosen.write is None:
         return _api_document(request, "api-board", split)
     return _answer(request, chosen, chosen.write, split=split_or_404(request, split))
@@ -57,7 +52,6 @@ def board(request: HttpRequest, split: str, chosen: Format) -> HttpResponse:
 
 @require_safe
 def edition(request: HttpRequest, split: str, number: int, chosen: Format) -> HttpResponse:
-    """The board of an edition, for ever."""
     if chosen.write is None:
         return _api_document(request, "api-edition-board", split, number)
     row = get_object_or_404(snapshots.editions(), split=split, number=number)
@@ -107,7 +101,7 @@ def _answer(
 
 
 def address(board: Board, query: BoardQuery) -> str:
-    """Return the lasting address of this table: its edition's page, or the board as of its time."""
+    """Return the permanent address: the edition's page, or the board as of its time."""
     if board.edition is None or query.at is not None:
         path = reverse("board", args=[board.split.pk])
     else:
@@ -122,7 +116,7 @@ def _asked(query: BoardQuery, **more: str) -> str:
 
 
 def of_method(results: Sequence[Result]) -> dict[str, str]:
-    """How a method is cited, and the split that its badge is about: the first on which it has a rank."""
+    """Return the citation of a method, and the split of its badge: the first with a rank."""
     first = next((result for result in results if result.entry.rank is not None), None)
     if first is None:
         return {}
@@ -131,10 +125,7 @@ def of_method(results: Sequence[Result]) -> dict[str, str]:
 
 
 def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str, Any]:
-    """Return the exports that a board's page offers: the public rows, and for a team its own as well.
-
-    All are of the same view: labels, each with its links. `board` is it as the reader sees it.
-    """
+    """Return the exports that a board's page offers, as labels with links, public or with own rows."""
     path = reverse("board", args=[board.split.pk])
     if edition is not None:
         path = reverse("edition", args=[edition.split_id, edition.number])

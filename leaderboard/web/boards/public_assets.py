@@ -1,4 +1,4 @@
-"""Public rows on other sites: the badge of a README, and the feed."""
+"""Public rows on other sites: badge and feed."""
 
 from uuid import UUID
 
@@ -18,7 +18,7 @@ from leaderboard.web.lookups import split_or_404
 
 @require_safe
 def badge(request: HttpRequest, method_id: UUID) -> HttpResponse:
-    """Rank and MiD of a method on `?split=`, as a drawing for a README."""
+    """Draw rank and MiD of a method on `?split=`."""
     split = split_or_404(request, request.GET.get("split") or MAIN_SPLIT)
     entries = snapshots.board(split=split, viewer=AnonymousUser()).entries
     entry = next((entry for entry in entries if entry.method_id == method_id), None)
@@ -32,7 +32,6 @@ def badge(request: HttpRequest, method_id: UUID) -> HttpResponse:
 
 @require_safe
 def feed(request: HttpRequest, split: str = "") -> HttpResponse:
-    """New entries of one split, or of all."""
     rows = [split_or_404(request, split)] if split else splits_of(request)
     where = f": {rows[0].title}" if split else ""
     text = feeds.atom(

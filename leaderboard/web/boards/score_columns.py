@@ -1,4 +1,4 @@
-"""Columns of scores on every page: their heads, and the cells with their marks and intervals."""
+"""Columns of scores on every page: heads, and cells with marks and intervals."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -30,9 +30,9 @@ MARKED: Final = "statistically tied for best in its column (95 % confidence)"
 
 @dataclass(frozen=True)
 class Heading:
-    """A column's head: a link that sorts by it, or turns the order round; and the scale of its whiskers.
+    """The head of a column: link to sort, and scale of its whiskers.
 
-    `range_css` is the class of all cells of its TTC range, by which a narrow screen chooses what it shows.
+    `range_css` is the class of its TTC range, by which a narrow screen hides cells.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Heading:
 
 @dataclass(frozen=True)
 class Cell:
-    """One number. `css` says how many decimals are to be imagined behind it, so that points stand in line."""
+    """A number. `css` aligns decimal points."""
 
     text: str
     css: str = ""
@@ -67,7 +67,7 @@ class Cell:
 
     @property
     def hint(self) -> str:
-        """The interval and the mark, shown when the pointer is on the number."""
+        """Return the interval and the mark for hover."""
         hints = (
             f"95 % confidence interval: {self.interval}" if self.interval else "",
             MARKED * self.is_with_best,
@@ -76,13 +76,13 @@ class Cell:
 
     @property
     def ends(self) -> list[str]:
-        """Both ends of the interval, for a column too narrow to have them side by side."""
+        """Return both ends of the interval, for a narrow column."""
         return self.interval.split(" to ")
 
 
 @dataclass(frozen=True)
 class Group:
-    """One of the metrics, over its columns."""
+    """A metric over its columns."""
 
     title: str
     unit: str
@@ -96,7 +96,7 @@ def ends_of(entry: Entry, name: str) -> whiskers.Ends | None:
 
 @cache
 def range_css(name: str) -> str:
-    """The class of all columns of a score's TTC range, by its number among the ranges of all protocols.
+    """Return the class of a score's TTC range, by its number among those of all protocols.
 
     >>> range_css("mid"), range_css("rte_crucial")
     ('at0', 'at1')
@@ -105,7 +105,7 @@ def range_css(name: str) -> str:
 
 
 def score_groups(names: Iterable[str], *, n_whiskers: int = 0) -> tuple[Group, ...]:
-    """The metrics of these scores over their columns; the first has those of the whiskers besides."""
+    """Group scores by metric; the first has the whiskers' columns as well."""
     return tuple(
         Group(
             title=f"{metric.title} ({metric.symbol})",
@@ -117,7 +117,6 @@ def score_groups(names: Iterable[str], *, n_whiskers: int = 0) -> tuple[Group, .
 
 
 def score_heading(name: str, query: BoardQuery | None = None, scale: WhiskerScale | None = None) -> Heading:
-    """The head of a score's column."""
     metric, ttc_range = metric_of(name), range_of(name)
     seconds = f"{ttc_range.name} {ttc_range.seconds}" if ttc_range else OVERALL
     return Heading(
@@ -142,7 +141,6 @@ def score_cells(
     names: Iterable[str] | None = None,
     scales: Mapping[str, WhiskerScale] = MappingProxyType({}),
 ) -> tuple[Cell, ...]:
-    """The numbers of a result, all or those of these names, each with its interval where it has one."""
     cells = []
     for name in entry.scores if names is None else names:
         value, interval = entry.scores.get(name), entry.intervals.get(name, ConfidenceInterval())
@@ -166,12 +164,10 @@ def score_cells(
 
 
 def interval_words(interval: ConfidenceInterval, *, decimals: int = SCORED_DECIMALS) -> str:
-    """Return an interval in words; empty where it is not known.
+    """Word an interval; empty where it is not known.
 
     >>> interval_words(ConfidenceInterval(low=13.9, high=14.523)), interval_words(ConfidenceInterval())
     ('13.90 to 14.52', '')
-    >>> interval_words(ConfidenceInterval(low=13.9, high=14.5), decimals=1)
-    '13.9 to 14.5'
     """
     if interval.low is None or interval.high is None:
         return ""
@@ -180,7 +176,7 @@ def interval_words(interval: ConfidenceInterval, *, decimals: int = SCORED_DECIM
 
 
 def figure_css(texts: Iterable[str]) -> str:
-    """The class that gives each of these figures the width of the widest, so that points stand in line.
+    """Return the class that gives each figure the width of the widest, so that points align.
 
     >>> figure_css(["9.36", "13.66"])
     'figure w5'
@@ -189,7 +185,7 @@ def figure_css(texts: Iterable[str]) -> str:
 
 
 def column_css(name: str) -> str:
-    """The class of a score's column: the one that ranks, one that begins a group, or one of the others.
+    """Return the class of a score's column: the ranking one, the first of a group, or another.
 
     >>> column_css("mid"), column_css("rte"), column_css("rte_large")
     ('primary first', 'overall first', 'wide')
@@ -200,7 +196,7 @@ def column_css(name: str) -> str:
 
 
 def cell_css(name: str, value: float | None, decimals: int) -> str:
-    """The class of a number: its column, and what keeps its point in line."""
+    """Return the class of a number: its column and alignment."""
     css = column_css(name)
     if value is None:
         return f"{css} absent"
@@ -208,7 +204,7 @@ def cell_css(name: str, value: float | None, decimals: int) -> str:
 
 
 def sort_href(name: str, query: BoardQuery | None) -> str:
-    """Sort by this column; where it decides already, turn round. Dates begin with the newest."""
+    """Sort by this column, or reverse its order; dates begin with the newest."""
     usual, other = (f"-{name}", name) if name == "date" else (name, f"-{name}")
     if query is None:
         return ""
@@ -216,7 +212,6 @@ def sort_href(name: str, query: BoardQuery | None) -> str:
 
 
 def aria_sort_of(name: str, query: BoardQuery | None) -> str:
-    """The attribute's value; empty for the columns that do not decide the order."""
     if query is None or query.sort.removeprefix("-") != name:
         return ""
     return "descending" if query.sort.startswith("-") else "ascending"

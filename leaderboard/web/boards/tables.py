@@ -1,7 +1,4 @@
-"""The table of a board: every number formatted, every mark decided, every link made, here in Python.
-
-Templates only place what they are given; a thousand rows of number filters would cost more than the query.
-"""
+"""The table of a board. Templates only place strings: number filters cost more than the query."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -46,8 +43,6 @@ _WHY_UNSCORABLE: Final = {
 
 @dataclass(frozen=True)
 class BoardRow:
-    """One entry, ready to be placed."""
-
     entry: Entry
     team: str
     cells: tuple[Cell, ...]
@@ -60,17 +55,16 @@ class BoardRow:
 
     @property
     def n_moved(self) -> int:
-        """By how many ranks, whichever way."""
         return abs(self.moved)
 
     @property
     def is_hypothetical(self) -> bool:
-        """Whether its rank is the one that it would have if it were public."""
+        """Tell whether its rank is the one that it would have if it were public."""
         return self.entry.rank is not None and not self.entry.is_visible_to_all
 
     @property
     def css(self) -> str:
-        """The classes of the row: whose it is, whether others see it, whether it was withdrawn."""
+        """Return the classes of the row."""
         entry = self.entry
         classes = {
             "mine": entry.is_mine,
@@ -81,14 +75,12 @@ class BoardRow:
 
     @property
     def can_be_compared(self) -> bool:
-        """Whether it can be compared: papers print no values per recording."""
+        """Tell whether it can be compared: papers print no values per recording."""
         return self.entry.method_id is not None and self.entry.scores[PRIMARY] is not None
 
 
 @dataclass(frozen=True)
 class BoardTable:
-    """Everything that the board's template places."""
-
     query: BoardQuery
     text_headings: dict[str, Heading]
     # The ranges that a narrow screen shows one of: class, label, chosen.
@@ -108,17 +100,14 @@ class BoardTable:
 
     @property
     def has_private_rows(self) -> bool:
-        """Whether the reader's team has rows here that it alone sees."""
         return any(not row.entry.is_visible_to_all for row in self.rows)
 
     @property
     def next_href(self) -> str:
-        """The next page's address; empty on the last."""
         return self._page_href(self.pages.number + 1) if self.pages.has_next() else ""
 
     @property
     def previous_href(self) -> str:
-        """The page's before; empty on the first."""
         return self._page_href(self.pages.number - 1) if self.pages.has_previous() else ""
 
     def _page_href(self, number: int) -> str:
@@ -126,7 +115,6 @@ class BoardTable:
 
 
 def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable:
-    """The board, ready to be drawn; its links keep what else the address asks for."""
     names = board.rules.names_of(query.columns)
     is_of_one = len(grouped_names(names)) == 1
     has_intervals = any(ends_of(entry, name) for entry in board.entries for name in names)
@@ -174,7 +162,7 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
 
 
 def _new_among(entries: Sequence[Entry], *, today: date) -> frozenset[UUID]:
-    """Return the methods that are new; none where most rows are, since the mark would say nothing."""
+    # None where most rows are new: the mark would say nothing.
     new = frozenset(
         entry.method_id
         for entry in entries
@@ -185,14 +173,13 @@ def _new_among(entries: Sequence[Entry], *, today: date) -> frozenset[UUID]:
 
 
 def _note(entry: Entry, present: Edition | None) -> str:
-    """Return why the present edition cannot score a row of a former one; it reveals nothing of the file."""
+    """Say why the present edition cannot score a row; it reveals nothing of the file."""
     if present is None or not entry.is_unscorable or entry.withdrawn_at:
         return ""
     return _WHY_UNSCORABLE.get(entry.unscorable, "Edition {} cannot score its file.").format(present.number)
 
 
 def _reason(board: Board, *, has_intervals: bool) -> str:
-    """Why no value has an interval, where something was scored at all."""
     is_scored = any(e.kind == "submission" and e.scores.get(PRIMARY) is not None for e in board.entries)
     if has_intervals or board.edition is None or not is_scored:
         return ""
@@ -200,7 +187,7 @@ def _reason(board: Board, *, has_intervals: bool) -> str:
 
 
 def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, WhiskerScale]:
-    """One scale for each of these columns, the same for all rows of all pages."""
+    """Return a scale for each of these columns, the same on all pages."""
     scales = {}
     for name in names:
         values = [(value, entry) for entry in entries if (value := entry.scores[name]) is not None]
@@ -222,12 +209,12 @@ def _range_choices(names: Sequence[str], query: BoardQuery) -> tuple[tuple[str, 
 
 
 def counted_ranges(rules: Protocol, counts: Mapping[str, int]) -> list[tuple[TTCRange, int | None]]:
-    """The TTC ranges of a protocol, in its order, each with the number of sequences in it."""
+    """Return the TTC ranges of a protocol with their numbers of sequences."""
     return [(each, counts.get(each.name)) for each in rules.ranges]
 
 
 def rank_range(entry: Entry) -> str:
-    """Return the ranks that an entry may have at 95 %; empty where its rank is the only one."""
+    """Word the 95 % rank range; empty where its rank is the only one."""
     interval = entry.intervals.get(PRIMARY, ConfidenceInterval())
     if interval.rank_low is None or interval.rank_high is None:
         return ""
@@ -248,7 +235,6 @@ def _text_heading(name: str, query: BoardQuery) -> Heading:
 
 
 def _attempts(entry: Entry) -> str:
-    """How often was tried; a public row counts all that its team shows."""
     if entry.n_attempts is None:
         return ""
     noun = "attempt" if entry.n_attempts == 1 else "attempts"

@@ -1,7 +1,6 @@
 """The column of confidence intervals: each row's value and interval on one scale, over that of the best row.
 
-The drawings are as wide as their cell, in percent, so that the same bytes fit every screen. The cell says the
-numbers in words beside them.
+Drawings are sized in percent, so the same bytes fit every screen; the cell has the numbers as text.
 """
 
 import math
@@ -38,11 +37,10 @@ class WhiskerScale:
 
     @property
     def is_log(self) -> bool:
-        """Whether equal distances are equal ratios."""
         return self.low > 0 and self.high > _LOG_FROM * self.low
 
     def percent(self, value: float) -> float:
-        """Return where a value is drawn; a value beyond an end is drawn at that end.
+        """Return the position of a value; one beyond an end is drawn at that end.
 
         >>> WhiskerScale(10.0, 20.0).percent(15.0), WhiskerScale(1.0, 100.0).percent(10.0)
         (50.0, 50.0)
@@ -55,7 +53,7 @@ class WhiskerScale:
         return round(_MARGIN + (100.0 - 2 * _MARGIN) * share, 1)
 
     def labels(self) -> tuple[float, ...]:
-        """The round numbers of the scale that have room for their text.
+        """Return the round numbers of the scale that have room for their text.
 
         >>> WhiskerScale(9.1, 84.0).labels(), WhiskerScale(11.2, 15.1).labels()
         ((10.0, 20.0, 50.0), (12.0, 14.0))
@@ -86,7 +84,7 @@ class WhiskerScale:
 
 
 def scale_of(values: Iterable[float], intervals: Iterable[Ends], *, best: Ends | None) -> WhiskerScale | None:
-    """A scale that shows most of these values; None where there are fewer than two.
+    """Make a scale that shows most of these values; None for fewer than two.
 
     >>> scale_of([10.0, 11.0, 12.0, 13.0, 900.0], [(9.5, 10.5)], best=(9.5, 10.5))
     WhiskerScale(low=9.5, high=13.0, best=(9.5, 10.5))
@@ -102,7 +100,7 @@ def scale_of(values: Iterable[float], intervals: Iterable[Ends], *, best: Ends |
 
 
 def whisker(scale: WhiskerScale, value: float, ends: Ends | None) -> SafeString:
-    """A value as a tick on its interval, or as a ring where it has none; dashes where it is off the scale."""
+    """Draw a tick on its interval, a ring without one, dashes off the scale."""
     parts = [_band(scale)]
     if ends is not None and ends[0] <= scale.high:
         left, right = map(scale.percent, ends)
@@ -118,7 +116,7 @@ def whisker(scale: WhiskerScale, value: float, ends: Ends | None) -> SafeString:
 
 
 def axis(scale: WhiskerScale) -> SafeString:
-    """The scale itself, for the head of a column: its round numbers over small marks."""
+    """Draw the scale for the head of a column."""
     ticks = [(f"{scale.percent(value):g}", f"{value:g}") for value in scale.labels()]
     marks = format_html_join("", '<line x1="{0}%" x2="{0}%" y1="13" y2="17"/>', ((at,) for at, _ in ticks))
     texts = format_html_join("", '<text x="{}%" y="10" text-anchor="middle">{}</text>', ticks)

@@ -1,4 +1,4 @@
-"""Charts of the error analysis of one submission; only its team sees it, and only on open splits."""
+"""Charts of a submission's error analysis, for its team on open splits."""
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
@@ -38,7 +38,6 @@ Row = Mapping[str, Any]
 
 
 def error_analysis_tables(closer: Analysis) -> dict[str, Any]:
-    """An analysis, ready to be placed."""
     content, distribution = closer.content, closer.content["distribution"]
     errors = [metric for metric in known_metrics().values() if metric.name in distribution]
     quantiles = zip(*(distribution[metric.name] for metric in errors), strict=True)
@@ -64,7 +63,7 @@ def error_analysis_tables(closer: Analysis) -> dict[str, Any]:
 
 
 def curve(bins: Sequence[Row], errors: Sequence[Metric]) -> Chart:
-    """The mean errors by true time to contact, each with its confidence interval where there is one."""
+    """Draw mean errors by true TTC with confidence intervals."""
     if not bins:
         return empty("curve")
     has_intervals = any(_interval(row, metric) for row in bins for metric in errors)
@@ -95,7 +94,6 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric]) -> Chart:
 
 
 def _interval(row: Row, metric: Metric) -> tuple[float, float] | None:
-    """The confidence interval of a bin's mean, if it has one."""
     interval = row.get("intervals", {}).get(metric.name)
     return (interval[0], interval[1]) if interval else None
 
@@ -105,7 +103,7 @@ def _ends(bins: Sequence[Row], metric: Metric) -> list[float]:
 
 
 def _runs(bins: Sequence[Row]) -> Iterator[list[Row]]:
-    """Yield runs of bins that touch each other, so that no line crosses a gap without sequences."""
+    # No line crosses a gap without sequences.
     run = [bins[0]]
     for before, row in itertools.pairwise(bins):
         if row["low_s"] != before["high_s"]:
@@ -154,7 +152,7 @@ def _value_words(row: Row, metric: Metric) -> str:
 
 
 def histogram(bins: Sequence[Row]) -> Chart:
-    """How many sequences have an error in each bin; the last bar holds all larger errors."""
+    """Draw the number of sequences in each bin of MiD; the last bar holds all larger errors."""
     if not bins:
         return empty("histogram")
     words = [_bin_words(row) for row in bins]
@@ -186,7 +184,7 @@ def _bin_words(row: Row) -> str:
 
 
 def _bar_ticks(bins: Sequence[Row]) -> list[tuple[float, str]]:
-    """Round values of MiD, and where they stand among bars of equal width; the bar of the rest says so.
+    """Return round values of MiD at their positions among bars of equal width.
 
     >>> _bar_ticks([{"low": 0.0}, {"low": 4.0}, {"low": 8.0}, {"low": 12.0}])
     [(0.0, '0'), (1.25, '5'), (2.5, '10'), (3.5, 'more')]
@@ -203,7 +201,7 @@ def _bar_ticks(bins: Sequence[Row]) -> list[tuple[float, str]]:
 
 
 def scatter(drawn: Mapping[str, Sequence[float]]) -> Chart:
-    """Draw every pair as a mark, with the line on which the two agree; outliers are at the edge."""
+    """Draw predicted against true TTC; outliers are at the edge."""
     pairs = sorted(zip(drawn["true_s"], drawn["predicted_s"], strict=True))
     if not pairs:
         return empty("scatter")

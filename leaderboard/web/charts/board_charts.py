@@ -1,8 +1,4 @@
-"""Charts of a board with a front: progress over time, accuracy against latency.
-
-They are made of the public rows, and each has a table with the same numbers. Hidden splits show nothing here
-that their board does not: values over whole TTC ranges, with the decimals of the split.
-"""
+"""Charts of a board: progress over time, and accuracy against latency, of public rows and values alone."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -52,7 +48,6 @@ class _Placed:
     is_front: bool = False
 
     def mark(self, praise: str) -> Mark:
-        """Return the mark with the lines that a reader gets."""
         value = error_text(MID, self.y, decimals=self.entry.decimals)
         read = [self.entry.method, team_of(self.entry), f"{value} {MID.unit}, {self.x_text}"]
         return Mark(
@@ -61,7 +56,7 @@ class _Placed:
 
 
 def _with_front(placed: Iterable[tuple[float, float, Entry, str]]) -> list[_Placed]:
-    """Return points by x, then y; on the front is what is better than everything before it."""
+    """Sort points by x, then y; the front is better than everything before it."""
     best, points = math.inf, []
     for x, y, entry, x_text in sorted(placed, key=lambda each: each[:2]):
         points.append(_Placed(x, y, entry, x_text, is_front=y < best))
@@ -70,7 +65,7 @@ def _with_front(placed: Iterable[tuple[float, float, Entry, str]]) -> list[_Plac
 
 
 def _drawn(points: Sequence[_Placed]) -> tuple[list[_Placed], str]:
-    """Return the front, those behind it with the lowest MiD, and a sentence on the points left out."""
+    """Return the front, the best points behind it, and a sentence on those left out."""
     behind = sorted((each for each in points if not each.is_front), key=lambda each: each.y)
     if len(behind) <= MAX_BEHIND:
         return list(points), ""
@@ -82,7 +77,7 @@ def _drawn(points: Sequence[_Placed]) -> tuple[list[_Placed], str]:
 def _front_series(
     points: Sequence[_Placed], *, line: str, praise: str, end: float
 ) -> tuple[list[Option], list[str]]:
-    """The marks of submissions and of rows from papers, the front with its names; and the legend's names."""
+    """Return the series of submissions and of published results, and the legend's names."""
     front = [each for each in points if each.is_front]
     series = [staircase(line, [*((each.x, each.y) for each in front), (end, front[-1].y)])]
     names = [line]
@@ -100,7 +95,6 @@ def _front_series(
 
 
 def _value_cells(points: Sequence[_Placed]) -> list[SafeString]:
-    """Their MiD for a table, as if all had the most decimals: the others keep the room of the missing one."""
     most = max(each.entry.decimals for each in points)
     return [
         format_html(
@@ -113,7 +107,7 @@ def _value_cells(points: Sequence[_Placed]) -> list[SafeString]:
 
 
 def decimals_css(entry: Entry, most: int) -> str:
-    """The class of a number with fewer decimals than the most: it keeps the room of the missing ones."""
+    """Return the class of a number with fewer decimals than `most`: it keeps the points aligned."""
     return "" if entry.decimals == most else f" d{entry.decimals}"
 
 
@@ -121,10 +115,7 @@ def decimals_css(entry: Entry, most: int) -> str:
 
 
 def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Chart:
-    """MiD of every submission by day, with the lowest MiD so far, and rows quoted from papers.
-
-    Papers say a year and no day: their rows stand in its middle.
-    """
+    """Draw MiD of every submission by day, and published results in the middle of their year."""
     by_method = {entry.method_id: entry for entry in entries if entry.method_id is not None}
     quoted = [
         (entry, value, entry.year)
@@ -198,7 +189,7 @@ def _day(at: datetime) -> datetime:
 
 
 def _time_range(days: Sequence[datetime], years: Sequence[int]) -> tuple[datetime, datetime]:
-    """From where to where the axis goes: whole years around papers, a margin around submissions."""
+    """Return the ends of the time axis: whole years around papers, a margin around submissions."""
     ends = [datetime(year, 1, 1, tzinfo=UTC) for year in years]
     ends += [datetime(year + 1, 1, 1, tzinfo=UTC) for year in years]
     margin = max(0.04 * (max([*ends, *days]) - min([*ends, *days])), timedelta(days=1))
@@ -226,7 +217,7 @@ def _time_title(first: datetime, last: datetime) -> str:
 
 
 def latency(entries: Sequence[Entry]) -> Chart:
-    """MiD against latency, of the methods that state one; the front is what nothing beats in both."""
+    """Draw MiD against latency, with the Pareto front."""
     points, note = _drawn(
         _with_front(
             (latency_ms, value, entry, f"{latency_ms:g} ms")

@@ -1,8 +1,7 @@
-"""Charts as options for Apache ECharts, built from the numbers of the table next to each.
+"""Charts as options for Apache ECharts, from the numbers of the table next to each.
 
-`static/charts.js` draws them. JSON has neither the page's colours nor functions, so a text such as "--accent"
-is the page's colour of that name, and `call("names", …)` a function of that script. The `read` of a mark are
-the lines that a reader gets near it, the `href` what a click opens. The script adds no number of its own.
+`static/charts.js` draws them: "--accent" is the page's colour of that name, `call("names", …)` a function of
+that script. `read` are a mark's lines for the reader, `href` the target of a click.
 """
 
 import math
@@ -29,7 +28,7 @@ TEXT: Final = {"color": "--ink", "fontSize": 12}
 
 @dataclass(frozen=True)
 class Chart:
-    """A chart ready to be placed: what ECharts draws, and the table with the same numbers."""
+    """A chart: ECharts options, and the table with the same numbers."""
 
     kind: str
     label: str  # what it shows, for those who cannot see it
@@ -44,18 +43,16 @@ class Chart:
 
     @property
     def has_links(self) -> bool:
-        """Whether a click on a mark opens anything."""
         series = self.options["baseOption"]["series"]
         return any("href" in mark for each in series for mark in each["data"])
 
     def __bool__(self) -> bool:
-        """Whether there is anything to draw: an empty chart is never shown."""
         return bool(self.rows)
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A point of a chart: its position, the lines that a reader gets, and the page that a click opens."""
+    """A point of a chart: position, lines for the reader, target of a click."""
 
     x: float
     y: float
@@ -63,28 +60,26 @@ class Mark:
     href: str = ""
 
     def item(self) -> Option:
-        """The mark as ECharts takes it."""
         option: Option = {"value": [self.x, self.y], "name": self.read[0], "read": list(self.read[1:])}
         return option | ({"href": self.href} if self.href else {})
 
 
 def empty(kind: str) -> Chart:
-    """Return a chart with nothing to draw."""
     return Chart(kind=kind, label="", options={}, columns=(), rows=())
 
 
 def call(name: str, of: Any = None) -> Option:
-    """A function of `static/charts.js`, and what it is about."""
+    """Refer to a function of `static/charts.js`."""
     return {"call": name, "of": of}
 
 
 def method_href(entry: Entry) -> str:
-    """The page of an entry's method; a row quoted from a paper has none."""
+    """Return the page of an entry's method; empty for a published result."""
     return reverse("method", args=[entry.method_id]) if entry.method_id else ""
 
 
 def error_text(metric: Metric, value: float | None, *, decimals: int) -> str:
-    """Return a value with its symbol, as readers see it.
+    """Format a value with its symbol.
 
     >>> from evaluator.metrics.registry import MID
     >>> error_text(MID, 14.3, decimals=2)
@@ -97,7 +92,7 @@ def error_text(metric: Metric, value: float | None, *, decimals: int) -> str:
 
 
 def round_range(low: float, high: float) -> tuple[float, float]:
-    """The last of …, 1, 2, 5, 10, … at or below `low`, and the first at or above `high`; both positive.
+    """Return the last of …, 1, 2, 5, 10, … at or below `low`, and the first at or above `high`.
 
     >>> round_range(13.0, 41.0), round_range(20.0, 20.0)
     ((10.0, 50.0), (20.0, 50.0))
@@ -113,10 +108,7 @@ def _round_numbers(low: float, high: float) -> list[float]:
 
 
 def log_axis(values: Iterable[float], *, room: float = 0.0) -> Option:
-    """A logarithmic axis around positive values, with numbers that can be read.
-
-    `room` is the part of its length that stays free below the least value, at least: a place for names.
-    """
+    """Make a logarithmic axis; `room` is the least free part below the values, for names."""
     known = list(values)
     low, high = round_range(min(known), max(known))
     while room and math.log(min(known) / low) < room * math.log(high / low):
@@ -129,7 +121,7 @@ def log_axis(values: Iterable[float], *, room: float = 0.0) -> Option:
 
 
 def error_axis(metric: Metric, values: Iterable[float], *, room: float = 0.0) -> Option:
-    """An axis of errors that exaggerates nothing: straight from 0, or logarithmic and saying so."""
+    """Make an axis of errors from 0, or logarithmic and labelled so."""
     known = list(values) or [1.0]
     name = f"{metric.symbol}, {metric.unit}"
     if min(known) <= 0 or max(known) <= _MAX_STRAIGHT * min(known):
@@ -138,7 +130,7 @@ def error_axis(metric: Metric, values: Iterable[float], *, room: float = 0.0) ->
 
 
 def y_axis(name: str, axis: Mapping[str, Any]) -> Option:
-    """An upright axis with its name above it, and hairlines across."""
+    """Add name and grid lines to an upright axis."""
     return _styled(axis) | {
         "name": name,
         "nameLocation": "end",
@@ -150,7 +142,6 @@ def y_axis(name: str, axis: Mapping[str, Any]) -> Option:
 
 
 def x_axis(name: str, axis: Mapping[str, Any]) -> Option:
-    """A level axis with its name below it."""
     return _styled(axis) | {
         "name": name,
         "nameLocation": "middle",
@@ -168,19 +159,18 @@ def _styled(axis: Mapping[str, Any]) -> Option:
 
 
 def ticks_axis(ticks: Sequence[tuple[float, str]], *, low: float, high: float) -> Option:
-    """Return an axis with ticks at these values, each with its text."""
+    """Make an axis with texts at these values."""
     at = {"customValues": [tick for tick, _ in ticks]}
     label = {**at, "formatter": call("texts", [list(tick) for tick in ticks])}
     return {"type": "value", "min": low, "max": high, "axisLabel": label, "axisTick": at}
 
 
 def names_axis(names: Sequence[str]) -> Option:
-    """Return an axis with the i-th name at i, so that there is room for marks next to it."""
     return ticks_axis(list(enumerate(names)), low=-0.5, high=len(names) - 0.5)
 
 
 def ranks_axis(names: Sequence[str], *, name: str = "", is_upright: bool = False) -> Option:
-    """An axis of a heat map: names at the left from the top downwards, or above it."""
+    """Make an axis of a heat map, at the left or above."""
     label: Option = {**QUIET}
     if is_upright:
         label = {**TEXT, "interval": 0, "overflow": "truncate", "ellipsis": "…"}
@@ -203,7 +193,7 @@ def ranks_axis(names: Sequence[str], *, name: str = "", is_upright: bool = False
 
 @dataclass(frozen=True)
 class Frame:
-    """The ground of a chart: its axes, one pair for each panel, and what is drawn on them."""
+    """The axes of a chart, a pair for each panel, and its series."""
 
     x_axes: Sequence[Option]
     y_axes: Sequence[Option]
@@ -218,7 +208,7 @@ class Frame:
     more: Mapping[str, Any] = field(default_factory=dict)
 
     def options(self) -> Option:
-        """Options of one panel, or of two side by side that stand one above the other where it is narrow."""
+        """Return the options of one panel, or of two that stack on a narrow screen."""
         n_panels = len(self.x_axes)
         base = {
             "animation": False,
@@ -250,7 +240,7 @@ class Frame:
         return layout | {"yAxis": [{"axisLabel": {"width": left - 16}} for _ in self.y_axes]}
 
     def _n_legend_lines(self, width_px: int) -> int:
-        """How many lines the legend takes at most at this width, by half an em for each letter."""
+        # Half an em for each letter.
         n_lines, used_px = 0, width_px
         for name in self.names:
             needed_px = 38 + min(_MAX_NAME_PX, 7 * len(name))

@@ -19,28 +19,24 @@ SERIES_SYMBOLS: Final = (
 
 @dataclass(frozen=True)
 class Look:
-    """How the marks of a series are drawn."""
-
     ink: str = "--s1"
     symbol: str = "circle"
     size: float = 9.0
     is_hollow: bool = False
 
     def style(self) -> Option:
-        """Hollow marks have the ground inside, full ones a rim of it, so that neighbours stay apart."""
+        # Hollow marks are filled with the ground, full ones have a rim of it, so that neighbours stay apart.
         if self.is_hollow:
             return {"color": "--ground", "borderColor": self.ink, "borderWidth": 1.25, "opacity": 1}
         return {"color": self.ink, "borderColor": "--ground", "borderWidth": 1, "opacity": 1}
 
 
 def marks(name: str, points: Iterable[Mark], look: Look, *, grid: int = 0, z: int = 2) -> Option:
-    """A series of marks."""
     shape = {"symbol": look.symbol, "symbolSize": look.size, "itemStyle": look.style()}
     return _read("scatter", name, points) | shape | {"xAxisIndex": grid, "yAxisIndex": grid, "z": z}
 
 
 def _read(kind: str, name: str, points: Iterable[Mark]) -> Option:
-    """Return what all series have whose marks show lines to a reader."""
     return {
         "type": kind,
         "name": name,
@@ -51,9 +47,9 @@ def _read(kind: str, name: str, points: Iterable[Mark]) -> Option:
 
 
 def named_marks(name: str, front: Sequence[Mark], chosen: Iterable[int], look: Look) -> Option:
-    """The chosen marks of a front, by their index in it, each with its name in the empty corner below it.
+    """Name the chosen marks of a front in the empty corner below each.
 
-    Where names would overlap, the later mark keeps its own: ECharts prefers larger marks, by a hair here.
+    Where names overlap, ECharts keeps those of larger marks: the later ones, by a hair.
     """
     indices = list(chosen)
     items = [{**front[i].item(), "symbolSize": look.size + 0.01 * i} for i in indices]
@@ -73,7 +69,7 @@ def named_marks(name: str, front: Sequence[Mark], chosen: Iterable[int], look: L
 
 
 def staircase(name: str, corners: Iterable[tuple[float, float]]) -> Option:
-    """A line that stays where it is until something better comes."""
+    """Draw a line that changes only where something better comes."""
     return {
         "type": "line",
         "name": name,
@@ -90,7 +86,6 @@ def staircase(name: str, corners: Iterable[tuple[float, float]]) -> Option:
 
 
 def line(name: str, points: Iterable[tuple[float, float]], ink: str, *, grid: int = 0) -> Option:
-    """A line through these points."""
     series = staircase(name, points)
     del series["step"]
     drawn = {"lineStyle": {"color": ink, "width": 1.5}, "itemStyle": {"color": ink}}
@@ -98,12 +93,10 @@ def line(name: str, points: Iterable[tuple[float, float]], ink: str, *, grid: in
 
 
 def whiskers(name: str, spans: Iterable[tuple[float, float, float]], ink: str, *, grid: int = 0) -> Option:
-    """Upright lines from low to high, each at its x."""
     return _custom("whisker", name, spans, ink, grid=grid)
 
 
 def band(name: str, spans: Iterable[tuple[float, float, float]], ink: str, *, grid: int = 0) -> Option:
-    """An area from low to high, over every x."""
     return _custom("band", name, spans, ink, grid=grid) | {
         "itemStyle": {"color": ink, "opacity": 0.25},
         "z": 0,
@@ -129,7 +122,6 @@ def _custom(
 
 
 def cells(name: str, points: Iterable[Mark], ink: str) -> Option:
-    """Return the cells of a heat map, each at its column and row."""
     series = _read("heatmap", name, points)
     for item in series["data"]:
         item["value"].append(0)  # ECharts draws no cell without a third value
@@ -137,6 +129,5 @@ def cells(name: str, points: Iterable[Mark], ink: str) -> Option:
 
 
 def bars(name: str, points: Iterable[Mark], ink: str) -> Option:
-    """A bar for each mark, read wherever the pointer is above or below its top."""
     series = _read("bar", name, points)
     return series | {"barCategoryGap": "12%", "itemStyle": {"color": ink}, "upright": True}

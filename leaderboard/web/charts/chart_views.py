@@ -1,4 +1,4 @@
-"""The page of a board's charts, and the options of one of them for other pages."""
+"""The page of a board's charts, and one chart's options for other pages."""
 
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import render
@@ -19,7 +19,6 @@ N_PROFILES = 5
 
 @require_safe
 def charts(request: HttpRequest, split: str) -> HttpResponse:
-    """Progress over time, accuracy against latency, errors by TTC range, significance of the first rows."""
     board = snapshots.board(split=split_or_404(request, split), viewer=request.user)
     pairs = comparisons.of_first(board=board)
     # What is being computed changes by itself.
@@ -47,13 +46,12 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
 
 @require_safe
 def progress_options(request: HttpRequest, split: str) -> HttpResponse:
-    """The progress of a split as options for ECharts: pages fetch it once the chart comes into view."""
+    """Answer a split's progress as ECharts options, fetched once the chart comes into view."""
     board = snapshots.board(split=split_or_404(request, split), viewer=request.user)
     return JsonResponse(progress(board).options)
 
 
 def progress(board: Board) -> Chart:
-    """The progress of a board, of what everybody sees of it."""
     shown = [entry for entry in board.entries if entry.is_visible_to_all]
     attempts = snapshots.shown(split=board.split, edition=board.edition).attempts if board.edition else ()
     return board_charts.progress(shown, attempts)

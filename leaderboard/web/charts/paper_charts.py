@@ -1,7 +1,4 @@
-"""The page of the paper's tables, each table in other formats, and charts of the ablations.
-
-A chart has the errors over the setting that is varied, one line for each method.
-"""
+"""The page of the paper's tables, each in other formats, and charts of the ablations."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -35,7 +32,7 @@ _MIN_SETTINGS: Final = 3
 
 
 def sweep(shown: PrintedTable) -> Chart:
-    """MiD and RTE of a table over the setting that it varies; empty for a table that varies none."""
+    """Draw MiD and RTE over the setting that a table varies; empty without one."""
     table = shown.table
     rows: dict[str | None, list[PublishedRow]] = defaultdict(list)
     for row in table.rows:
@@ -91,7 +88,6 @@ def _setting(row: PublishedRow) -> float:
 def _series(
     legend: str, name: str, points: Sequence[tuple[float, float, PublishedRow]], *, index: int, grid: int
 ) -> list[Option]:
-    """A line and its marks; the mark of the default is larger."""
     metric, ttc_range = metric_of(name), split_name(name)[1]
     named = metric.symbol if ttc_range == OVERALL else f"{metric.symbol} {ttc_range}"
     setting_marks = [
@@ -122,7 +118,6 @@ DOWNLOADS: Final = tuple(each for each in FORMATS if each.name in {"csv", "latex
 @gzip_page
 @require_safe
 def published_page(request: HttpRequest) -> HttpResponse:
-    """All tables, each with its notes; a chart where a setting is varied."""
     shown = [{"shown": each, "chart": sweep(each)} for each in published.printed_tables()]
     context = {"tables": shown, "source": published_tables().source, "downloads": DOWNLOADS}
     return render(request, "charts/published.html", context)
@@ -130,7 +125,6 @@ def published_page(request: HttpRequest) -> HttpResponse:
 
 @require_safe
 def published_table(request: HttpRequest, table_name: str, suffix: str) -> HttpResponse:
-    """One table as CSV, LaTeX or Markdown."""
     chosen = next((each for each in DOWNLOADS if each.suffix == suffix), None)
     table = next((each for each in published_tables().tables if each.name == table_name), None)
     if chosen is None or table is None:

@@ -1,4 +1,4 @@
-"""The chart of errors by TTC range, with confidence intervals, of up to five methods side by side."""
+"""The chart of errors by TTC range, with confidence intervals, of up to five methods."""
 
 from collections.abc import Sequence
 
@@ -26,7 +26,6 @@ from leaderboard.web.charts.chart_series import SERIES_INKS, SERIES_SYMBOLS, Loo
 
 
 def profile(entries: Sequence[Entry]) -> Chart:
-    """Values with their confidence intervals by TTC range, up to five methods side by side."""
     shown = [entry for entry in entries if entry.scores[PRIMARY] is not None][: len(SERIES_INKS)]
     if not shown:
         return empty("profile")
@@ -66,7 +65,7 @@ def profile(entries: Sequence[Entry]) -> Chart:
 
 
 def _legend_name(k: int, entry: Entry) -> str:
-    """A method in the legend, with its rank; its place in the chart where there is none keeps names apart."""
+    # The position in the chart keeps names apart where there is no rank.
     rank_text = f"{entry.rank} {rank_range(entry)}".strip() if entry.rank is not None else f"[{k + 1}]"
     return f"{rank_text}  {entry.method}"
 
@@ -85,7 +84,7 @@ def _all_ends(shown: Sequence[Entry], names: Sequence[str]) -> list[float]:
 def _profile_series(
     k: int, entry: Entry, names: Sequence[str], *, n_methods: int, grid: int
 ) -> tuple[Option, Option]:
-    """Return the marks of one method in one panel, apart from those of others, and their whiskers."""
+    """Return the marks and whiskers of one method in one panel, moved aside from others."""
     step = min(0.16, 0.7 / n_methods)
     offset = step * (k - (n_methods - 1) / 2)
     points = [
@@ -122,7 +121,6 @@ def _value_words(entry: Entry, name: str) -> str:
 
 
 def _profile_cell(entry: Entry, name: str, css: str, most: int) -> SafeString:
-    """A value with its interval for a table; `css` gives the text before the interval its width."""
     words = interval_words(entry.intervals.get(name, ConfidenceInterval()), decimals=entry.decimals)
     return format_html(
         '<span class="{}{}">{}</span>{}',

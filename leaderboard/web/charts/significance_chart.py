@@ -38,18 +38,17 @@ class _Cell:
 
     @property
     def mid_difference(self) -> Difference | None:
-        """The difference in MiD; None until a worker has computed it."""
+        """Return the difference in MiD; None until a worker has computed it."""
         return (self.pair.differences or {}).get(PRIMARY)
 
     @property
     def verdict(self) -> str:
-        """The class of its p-value, or why there is none."""
+        """Return the class of its p-value, or why there is none."""
         if self.mid_difference is None or self.mid_difference.p_below is None:
             return UNKNOWN
         return SIGNIFICANT.get(self.mid_difference.p_below, UNDECIDED)
 
     def texts(self) -> tuple[str, str, str]:
-        """The difference, its confidence interval and p."""
         if self.mid_difference is None:
             return "being computed", "", ""
         decimals = self.pair.first.decimals
@@ -60,7 +59,6 @@ class _Cell:
         return difference, " to ".join(ends), p_cell(self.mid_difference.p, self.mid_difference.p_below)
 
     def mark(self) -> Mark:
-        """Return the mark with the lines that a reader gets."""
         difference, interval, p = self.texts()
         first, second = self.pair.first, self.pair.second
         words = f"{MID.symbol} {difference}" + (f" ({interval})" if interval else "")
@@ -71,7 +69,7 @@ class _Cell:
 
 
 def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
-    """For each pair of rows whether the lead of the better one is significant; rows against columns."""
+    """Draw whether each row is significantly better than each below it."""
     if not pairs:
         return empty("significance")
     entries = _entries(pairs)

@@ -1,7 +1,4 @@
-"""Differences with their intervals as small SVG drawings on one scale, as far left of 0 as right of it.
-
-Whoever cannot see them reads the same numbers as text beside them; the drawings say nothing alone.
-"""
+"""Differences with their intervals as small SVG drawings on one symmetric scale, next to the numbers."""
 
 import math
 from collections.abc import Iterable
@@ -16,12 +13,10 @@ _STEPS: Final = (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0)
 
 
 def round_ticks(low: float, high: float, *, n: int) -> tuple[float, ...]:
-    """At most `n` steps in round numbers, from below `low` to above `high`.
+    """Return at most `n` steps in round numbers, from below `low` to above `high`.
 
-    >>> round_ticks(9.3, 31.0, n=4)
-    (0.0, 10.0, 20.0, 30.0, 40.0)
-    >>> round_ticks(0.6, 0.6, n=3)
-    (0.6, 0.7)
+    >>> round_ticks(9.3, 31.0, n=4), round_ticks(0.6, 0.6, n=3)
+    ((0.0, 10.0, 20.0, 30.0, 40.0), (0.6, 0.7))
     """
     span = (high - low) or abs(high) or 1.0
     power = 10.0 ** math.floor(math.log10(span / n))
@@ -33,7 +28,7 @@ def round_ticks(low: float, high: float, *, n: int) -> tuple[float, ...]:
 
 
 def scale_end(values: Iterable[float]) -> float:
-    """The round number at the right end of a scale that holds these.
+    """Return the round number at the right end of a scale.
 
     >>> scale_end([-3.2, 1.0])
     4.0
@@ -48,7 +43,7 @@ def _x(value: float, end: float) -> str:
 
 
 def difference(end: float, value: float, low: float | None, high: float | None) -> SafeString:
-    """A difference as a dot with its interval as a line, or as a ring without one; and the line at 0."""
+    """Draw a dot with its interval as a line, or a ring without one, and the line at 0."""
     line, css = SafeString(""), "ring"
     if low is not None and high is not None:
         left, right = _x(low, end), _x(high, end)
@@ -65,7 +60,7 @@ def difference(end: float, value: float, low: float | None, high: float | None) 
 
 
 def axis(end: float) -> SafeString:
-    """The scale itself, for the head of a column: both ends over small marks."""
+    """Draw the scale for the head of a column."""
     return format_html(
         '<svg class="axis" viewBox="0 0 {width} 14" aria-hidden="true">'
         '<path d="M{left} 14H{right}M{left} 11v3M{middle} 11v3M{right} 11v3"/>'
@@ -80,7 +75,7 @@ def axis(end: float) -> SafeString:
 
 
 def tick_text(value: float) -> str:
-    """A number at a scale, with a minus that is one.
+    """Format a number with a true minus.
 
     >>> tick_text(-2.5), tick_text(20.0)
     ('−2.5', '20')

@@ -25,7 +25,7 @@ _NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
 
 
 def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, Any]:
-    """Return a comparison for the compare page; `n_tried` are scored submissions by method."""
+    """Return a comparison for the page; `n_tried` are scored submissions by method."""
     return {
         "compared": compared,
         "verdict": verdict(compared),
@@ -38,10 +38,7 @@ def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, 
 
 
 def verdict(compared: Compared) -> str:
-    """Return the outcome in words: a sentence for two; for more the best, and what it is better than.
-
-    Empty while a worker still computes it.
-    """
+    """Word the outcome: of two a sentence; of more the best, and which are significantly worse."""
     if not compared.is_complete:
         return ""
     if len(compared.entries) == len(("first", "second")):
@@ -64,11 +61,10 @@ def verdict(compared: Compared) -> str:
 
 
 def _worse_and_alike(best: Entry, tested: Sequence[Pair]) -> tuple[list[str], list[str]]:
-    """The methods that the best is significantly better than in MiD, and the others.
+    """Return the methods that the best is significantly better than in MiD, and the others.
 
-    The best was chosen by looking, so all pairs are tested together. What the board says of the same methods
-    holds first: nothing is worse that it marks as possibly the best, and ranks whose ranges do not meet
-    differ.
+    The best was chosen from the data, so all pairs are tested together. The board's marks and rank ranges
+    outweigh this test.
     """
     apart = significant_together([(pair.differences or {})[PRIMARY] for pair in tested])
     worse: list[str] = []
@@ -85,7 +81,6 @@ def _worse_and_alike(best: Entry, tested: Sequence[Pair]) -> tuple[list[str], li
 
 
 def _pair_table(pair: Pair) -> dict[str, Any]:
-    """Two methods and their differences, in words and as a table; no groups while they are computed."""
     differences = pair.differences or {}
     columns = pair.first.scores
     return {

@@ -1,4 +1,4 @@
-"""The page that sets two to five methods side by side."""
+"""The page of a comparison."""
 
 from collections import Counter
 
@@ -22,14 +22,12 @@ MAX_OFFERED = 50
 
 
 class UnknownSplit(comparisons.BadComparison):
-    """There is no such split."""
-
     code = "unknown-split"
 
 
 @require_safe
 def compare(request: HttpRequest) -> HttpResponse:
-    """Two to five methods of one board, their differences and what they mean; or the choice of them."""
+    """Show two to five methods of one board and their differences, or the choice of them."""
     wanted, name = request.GET.getlist("m"), request.GET.get("split") or MAIN_SPLIT
     splits = splits_of(request)
     split = next((split for split in splits if split.pk == name), None)
@@ -67,7 +65,6 @@ def _drawn(request: HttpRequest, compared: comparisons.Compared) -> HttpResponse
 
 
 def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None) -> dict[str, object]:
-    """Return the methods that can be compared on this board, the best first."""
     board = snapshots.board(split=split, viewer=request.user)
     entries = [entry for entry in board.entries if entry.method_id and entry.scores["mid"] is not None]
     # A method's page asks for the choice of others beside it.

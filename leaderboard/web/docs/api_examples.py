@@ -1,8 +1,7 @@
-"""An example of each operation of the API: what to send, by curl, by `tsttc` and from Python, and the answer.
+"""An example of each operation of the API, by curl, `tsttc` and Python, and its answer.
 
-The answers in `api_answers.json` were given by the API itself; `tests/api_examples.py` sends every request
-and records them. Ids, times and signatures are the same in all of them, and of a long list only the first
-member is shown.
+`tests/api_examples.py` sends every request and records the answers in `api_answers.json`, with constant ids,
+times and signatures, and only the first member of a long list.
 """
 
 import json
@@ -41,11 +40,9 @@ class Call:
 
     @property
     def target(self) -> str:
-        """Path and query."""
         return f"{self.path}?{urlencode(self.query)}" if self.query else self.path
 
     def curl(self, site: str) -> str:
-        """The command that sends it."""
         parts = [f'curl "{site}{self.target}"']
         if self.method not in {"GET", "POST"} or (self.method == "POST" and not (self.form or self.body)):
             parts[0] = f'curl -X {self.method} "{site}{self.target}"'
@@ -61,7 +58,7 @@ class Call:
 
 @dataclass(frozen=True)
 class Example:
-    """A request that is answered, one that is refused, and the same from the command line and from Python."""
+    """An accepted request, a refused one, and the same by command line and Python."""
 
     call: Call
     refused: Call
@@ -70,7 +67,7 @@ class Example:
     by: str = "owner"  # who asks: "maintainer" has a token of theirs
 
     def script(self, site: str) -> str:
-        """Return the Python to run; empty where there is none."""
+        """Return the Python code, if any."""
         if not self.python:
             return ""
         token = ', token=os.environ["TSTTC_TOKEN"]' if self.call.has_token else ""
@@ -214,7 +211,7 @@ EXAMPLES: Final[Mapping[str, Example]] = {
 
 
 def shown(operation_id: str) -> dict[str, Any]:
-    """Return the examples of an operation for its page: the requests as commands, and their answers."""
+    """Return the examples of an operation for its page."""
     example, recorded = EXAMPLES[operation_id], json.loads(_ANSWERS.read_text(encoding="utf-8"))[operation_id]
     return {
         "curl": example.call.curl(settings.SITE_URL),
@@ -228,7 +225,6 @@ def shown(operation_id: str) -> dict[str, Any]:
 
 
 def _answer(recorded: Mapping[str, Any]) -> dict[str, Any]:
-    """A status with its phrase, headers worth a line, and the body as text, with this site's address."""
     body = recorded["body"]
     text = body if isinstance(body, str) else json.dumps(body, indent=2, ensure_ascii=False)
     ours = {name: value.replace(SITE, settings.SITE_URL) for name, value in recorded["headers"].items()}

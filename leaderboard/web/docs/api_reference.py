@@ -1,8 +1,4 @@
-"""The API's reference: the schema that programs read, arranged for a template.
-
-The usual viewers of such schemas style themselves inline and load fonts from elsewhere; this site's policy
-forbids both.
-"""
+"""The API's reference: the schema, arranged for a template, since the usual viewers break this site's CSP."""
 
 import re
 from functools import cache
@@ -38,7 +34,7 @@ def reference() -> Node:
 
 
 def _inline_enums(node: Any, named: Node) -> Any:
-    """The same tree, with every reference to something other than an object replaced by its target."""
+    """Replace references to anything but objects by their targets."""
     if isinstance(node, list):
         return [_inline_enums(each, named) for each in node]
     if not isinstance(node, dict):
@@ -51,7 +47,7 @@ def _inline_enums(node: Any, named: Node) -> Any:
 
 
 def _operation(method: str, path: str, node: Node, schemas: Node, shared: Node) -> Node:
-    """One operation. Answers that every operation may give are references into `shared`."""
+    """Arrange one operation. Answers of every operation are references into `shared`."""
     parameters = sorted(node.get("parameters", []), key=lambda p: (p["in"] != "path", path.find(p["name"])))
     content = node.get("requestBody", {}).get("content", {})
     bodies = {media: schemas[_target(body["schema"])] for media, body in content.items()}
@@ -84,7 +80,6 @@ def _object(name: str, node: Node) -> Node:
 
 
 def _objects_in(node: Any, schemas: Node) -> list[str]:
-    """The names of the objects that the answers of an operation consist of, in the order of their mention."""
     names: list[str] = []
     waiting = [node["responses"]]
     while waiting:
@@ -106,7 +101,7 @@ def _fields(node: Node) -> list[Node]:
 
 
 def _field(name: str, node: Node, is_required: bool) -> Node:
-    """A field or parameter. A list of choices that only repeats the names in its kind is left out."""
+    """Arrange a field or parameter; skip choices that only repeat the names in its kind."""
     about = _BARE_CHOICE.sub("", node.get("description", "")).strip()
     return {"name": name, "kind": _kind(node), "about": about, "is_required": is_required}
 
@@ -116,7 +111,7 @@ def _target(node: Node) -> str:
 
 
 def _kind(node: Node) -> str:
-    """The type of a value as HTML; the name of an object links to its fields.
+    """Return a type as HTML; the name of an object links to its fields.
 
     >>> _kind({"type": ["number", "null"]}), _kind({"type": "string", "format": "date-time"})
     ('number or null', 'date-time')

@@ -1,7 +1,6 @@
-"""The pages of documentation, those that maintainers write, and the wheel of the evaluator.
+"""Pages of documentation, those of maintainers, and the wheel.
 
-The documentation asks the database for nothing but the splits of the first page, so it answers without one as
-well. Long pages are compressed here: not every site has a proxy that does so.
+Most answer without the database. Long pages are compressed here: not every site has a proxy that does so.
 """
 
 from django.http import FileResponse, Http404, HttpRequest, HttpResponse, HttpResponseBase
@@ -22,7 +21,6 @@ from leaderboard.web.docs import api_examples, api_reference, guides, reference,
 @gzip_page
 @require_safe
 def docs(request: HttpRequest) -> HttpResponse:
-    """How to submit, the file's format, the errors, the API."""
     facts = reference.docs(splits_of(request), now=timezone.now())
     context = {"navigation": guides.navigation(), "wheel": wheels.current(), **facts}
     return render(request, "docs/docs.html", context)
@@ -31,7 +29,6 @@ def docs(request: HttpRequest) -> HttpResponse:
 @gzip_page
 @require_safe
 def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
-    """One guide of `docs/`."""
     if guide_name not in guides.files():
         raise Http404(f"There is no guide {guide_name!r}.")
     before, after = guides.neighbours(guide_name)
@@ -48,7 +45,6 @@ def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
 @gzip_page
 @require_safe
 def find(request: HttpRequest) -> HttpResponse:
-    """Show the search in the documentation."""
     query = " ".join(request.GET.get("q", "").replace("\x00", " ").split())[: search.MAX_QUERY]
     hits = search.find(query) if query else []
     context = {"navigation": guides.navigation(), "query": query, "hits": hits}
@@ -58,7 +54,6 @@ def find(request: HttpRequest) -> HttpResponse:
 @gzip_page
 @require_safe
 def api_operation(request: HttpRequest, operation_id: str) -> HttpResponse:
-    """One operation of the API: a request, its answer, parameters and errors."""
     operations = api_reference.reference()["operations"]
     operation = next((each for each in operations if each["id"] == operation_id), None)
     if operation is None:
@@ -75,20 +70,16 @@ def api_operation(request: HttpRequest, operation_id: str) -> HttpResponse:
 @gzip_page
 @require_safe
 def api_page(request: HttpRequest) -> HttpResponse:
-    """Every operation, parameter and object of the API."""
     context = {"navigation": guides.navigation(), "api": api_reference.reference()}
     return render(request, "docs/api_reference.html", context)
 
 
 class PageConverter(StringConverter):
-    """The name of a page, in an address."""
-
     regex = "|".join(PAGES)
 
 
 @require_safe
 def site_page(request: HttpRequest, page_name: str) -> HttpResponse:
-    """Rules, contact, privacy, imprint or licence."""
     version = texts.current(page_name)
     text = version.text if version else texts.default_text(page_name)
     context = {"page": PAGES[page_name], "version": version, "text": markdown.page(text)}
@@ -97,7 +88,6 @@ def site_page(request: HttpRequest, page_name: str) -> HttpResponse:
 
 @require_safe
 def dist(request: HttpRequest) -> HttpResponse:
-    """The line that installs the evaluator, and the digest of what it installs."""
     wheel = wheels.current()
     context = {"navigation": guides.navigation(), "wheel": wheel}
     return render(request, "docs/install.html", context, status=200 if wheel else 404)
@@ -105,7 +95,6 @@ def dist(request: HttpRequest) -> HttpResponse:
 
 @require_safe
 def dist_file(request: HttpRequest, wheel_name: str) -> HttpResponseBase:
-    """A wheel, for pip."""
     path = next((each for each in wheels.paths() if each.name == wheel_name), None)
     if path is None:
         raise Http404(f"There is no wheel {wheel_name!r}.")

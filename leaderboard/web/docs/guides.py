@@ -1,4 +1,4 @@
-"""The guides of `docs/` as pages: which there are, how they follow each other, and where their links lead."""
+"""The guides of `docs/` as pages: their order and links."""
 
 import re
 from dataclasses import dataclass
@@ -70,7 +70,6 @@ class GuideLink:
 
 @cache
 def files() -> dict[str, Path]:
-    """Every guide by its name in addresses."""
     paths = {
         _NAMES.get(name, name): path
         for path in (*_DOCS.glob("*.md"), *_DOCS.glob("adr/*.md"))
@@ -86,7 +85,7 @@ def _names() -> dict[Path, str]:
 
 @cache
 def navigation() -> list[tuple[str, list[GuideLink]]]:
-    """Return the side of every page of the documentation: links below titles, the first title empty."""
+    """Return the side navigation: links below titles, the first title empty."""
     first = [
         GuideLink("At a glance", reverse("docs")),
         GuideLink("Install", reverse("dist")),
@@ -104,7 +103,7 @@ def _entry(title: str, name: str) -> GuideLink:
 
 
 def neighbours(name: str) -> tuple[GuideLink | None, GuideLink | None]:
-    """The guides before and after this one in the navigation."""
+    """Return the guides before and after this one."""
     entries = [entry for _, links in navigation() for entry in links]
     at = next((n for n, entry in enumerate(entries) if entry.name == name), None)
     if at is None:
@@ -114,7 +113,7 @@ def neighbours(name: str) -> tuple[GuideLink | None, GuideLink | None]:
 
 @cache
 def guide(name: str) -> Document:
-    """The guide of this name, drawn once in the life of the process. Raises `KeyError` for any other name."""
+    """Render a guide, once in a process. Raises `KeyError`."""
     path = files()[name]
 
     def link(address: str) -> str:
@@ -124,7 +123,6 @@ def guide(name: str) -> Document:
 
 
 def _link(address: str, *, source: Path) -> str:
-    """Return the address on the site that a link in a file leads to. Raises `DeadLink`."""
     parts = urlsplit(address)
     if parts.scheme in _SCHEMES or address.startswith("#"):
         return address
@@ -138,7 +136,7 @@ def _link(address: str, *, source: Path) -> str:
 
 
 def _image(address: str) -> dict[str, str]:
-    """The static file of a figure in `docs/figures/`, and its size, so that nothing moves when it arrives."""
+    """Return address and size of a figure, so that nothing moves when it is loaded."""
     drawn = (_DOCS / address).read_text(encoding="utf-8")
     size = _VIEW_BOX.search(drawn)
     if size is None:

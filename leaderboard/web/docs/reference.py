@@ -1,4 +1,4 @@
-"""The facts that the documentation page states, taken from the code that obeys them."""
+"""The facts on the documentation page, taken from the code."""
 
 from collections.abc import Sequence
 from datetime import datetime
@@ -33,13 +33,12 @@ GROUND_TRUTH_CODES: Final = frozenset(
 
 
 def example_split(splits: Sequence[Split], *, now: datetime) -> Split | None:
-    """The split that the commands name: one that takes submissions, or else one that has a manifest."""
+    """Return the split for the example commands: one that takes submissions, else one with a manifest."""
     is_open = (split for split in splits if admissions.is_open(split, now=now))
     return next(is_open, None) or next((split for split in splits if split.has_ground_truth), None)
 
 
 def docs(splits: Sequence[Split], *, now: datetime) -> dict[str, Any]:
-    """Return the context of `docs.html`."""
     example = example_split(splits, now=now)
     protocol = get_protocol(DEFAULT_PROTOCOL)
     return {

@@ -1,4 +1,4 @@
-"""Search in the guides: the parts that have every word, those with it in a heading before the others."""
+"""Search in the guides: parts with every word, those with it in a heading first."""
 
 import re
 from typing import Final, NamedTuple
@@ -24,7 +24,7 @@ _FILLERS: Final = frozenset(
 
 
 class Hit(NamedTuple):
-    """A part of a guide; the words asked for are marked in the snippet."""
+    """A part of a guide; the snippet marks the words."""
 
     title: str
     heading: str
@@ -33,7 +33,7 @@ class Hit(NamedTuple):
 
 
 def find(query: str) -> list[Hit]:
-    """At most `MAX_HITS` parts, the best first; parts with some of the words if none has all of them."""
+    """Return at most `MAX_HITS` parts, best first; those with some words if none has all."""
     typed = set(_WORD.findall(query.lower()))
     asked = [_pattern(word) for word in sorted(typed - _FILLERS or typed)]
     ranked = []

@@ -1,8 +1,4 @@
-"""The wheel that the site serves: what `pip install` takes from here, with its digest.
-
-`manage.py build_wheel` puts it into `settings.DIST_DIR`. It has the evaluator, the command `tsttc` and the
-baselines, and nothing of the leaderboard.
-"""
+"""The wheel that the site serves from `settings.DIST_DIR`, with its digest; see `manage.py build_wheel`."""
 
 import hashlib
 from pathlib import Path
@@ -13,12 +9,11 @@ from django.urls import reverse
 
 
 def paths() -> list[Path]:
-    """Every wheel that was built."""
     return list(Path(settings.DIST_DIR).glob("tsttc-*-py3-none-any.whl"))
 
 
 def current() -> dict[str, Any] | None:
-    """Return what pages show of the wheel that was built last; None where there is none."""
+    """Describe the latest wheel, if there is one."""
     path = max(paths(), key=lambda each: each.stat().st_mtime_ns, default=None)
     if path is None:
         return None

@@ -1,4 +1,4 @@
-"""What crawlers and browsers ask for by fixed names: robots.txt, sitemap.xml, favicon.ico."""
+"""Files with fixed names: robots.txt, sitemap.xml, favicon.ico."""
 
 from collections.abc import Iterator, Sequence
 from datetime import datetime
@@ -35,7 +35,6 @@ _NOT_FOR_CRAWLERS: Final = (
 
 @require_safe
 def robots(request: HttpRequest) -> HttpResponse:
-    """Return robots.txt: the pages that crawlers leave alone."""
     lines = [
         "User-agent: *",
         *(f"Disallow: {path}" for path in _NOT_FOR_CRAWLERS),
@@ -46,13 +45,12 @@ def robots(request: HttpRequest) -> HttpResponse:
 
 @require_safe
 def favicon(request: HttpRequest) -> HttpResponse:
-    """The icon, for who asks for it by its usual name instead of by the link of the page."""
     return HttpResponseRedirect(static("favicon.ico"))
 
 
 @require_safe
 def sitemap(request: HttpRequest) -> HttpResponse:
-    """Every public page. Private and anonymous methods and withdrawn rows are left out."""
+    # Private and anonymous methods and withdrawn rows are left out.
     fixed = [
         *map(_absolute, _NAMED),
         *(_absolute("site_page", name) for name in texts.PAGES),

@@ -1,4 +1,4 @@
-"""The landing page, and the way to the main board."""
+"""The landing page, and the redirect to the main board."""
 
 from collections.abc import Sequence
 from datetime import datetime
@@ -27,7 +27,6 @@ from leaderboard.web.submissions.forms import offers_for
 
 @require_safe
 def home(request: HttpRequest) -> HttpResponse:
-    """The landing page."""
     splits = splits_of(request)
     main = main_split(splits)
     source = bibtex.benchmark_source()
@@ -54,14 +53,14 @@ def main_board(request: HttpRequest) -> HttpResponse:
 
 
 def main_split(splits: Sequence[Split]) -> Split | None:
-    """The split whose numbers papers quote; without it the first, if there is any."""
+    """Return the split whose numbers papers quote, else the first."""
     return next((split for split in splits if split.pk == MAIN_SPLIT), next(iter(splits), None))
 
 
 def _dates(
     splits: Sequence[Split], *, reader: User | AnonymousUser, now: datetime
 ) -> list[tuple[Split, str]]:
-    """Every split and when it takes submissions; for who is signed in with what their team has left."""
+    """Say when each split takes submissions; to members also what their team has left."""
     if reader.is_authenticated:
         return [(offer.split, offer.sentence) for offer in offers_for(reader, now=now)]
     return [
@@ -71,7 +70,7 @@ def _dates(
 
 
 def _leading(main: Split) -> dict[str, Any]:
-    """Return what the page shows of the main board: for every reader only what everybody sees."""
+    # Only what everybody sees, for every reader.
     board = snapshots.board(split=main, viewer=AnonymousUser())
     progress = chart_views.progress(board)
     return {

@@ -1,4 +1,4 @@
-"""The first rows of a board, and in a sentence whether the lead is certain."""
+"""The first rows of a board, and whether the lead is certain."""
 
 from collections.abc import Sequence
 from typing import Any, Final
@@ -21,7 +21,6 @@ _MAX_NAMED: Final = 2
 
 
 def leaders(board: Board) -> list[dict[str, Any]]:
-    """The first rows of a board that is in the order of its ranks, as the page tells them."""
     return [
         {
             "entry": entry,
@@ -41,10 +40,7 @@ def _ranked(board: Board) -> list[Entry]:
 
 
 def lead_words(board: Board) -> str:
-    """Say in a sentence how certain the lead is, by the rows' rank ranges; empty for fewer than two rows.
-
-    A rank range holds the ranks that a row may have at 95 % confidence for all rows together.
-    """
+    """Say how certain the lead is, by 95 % rank ranges; empty for fewer than two rows."""
     ranked = _ranked(board)
     first = [entry for entry in ranked if entry.rank == 1]
     if len(ranked) < 2:
@@ -76,7 +72,7 @@ def _why_unknown(board: Board, leader: Entry) -> str:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Names in a sentence.
+    """List names in a sentence.
 
     >>> _listed(["A", "B"]), _listed(["A", "B", "C"])
     ('A and B', 'A, B and 1 other method')

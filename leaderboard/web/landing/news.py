@@ -1,4 +1,4 @@
-"""The latest news of all boards: editions that were published or rolled back, and new entries."""
+"""The latest news of all boards: published editions, rollbacks and new entries."""
 
 from collections.abc import Iterator, Sequence
 from datetime import datetime
@@ -22,7 +22,7 @@ News = tuple[datetime, str, str, str]
 
 
 def latest(splits: Sequence[Split]) -> list[News]:
-    """The newest first, of these splits; what everybody sees of them, under the names that everybody sees."""
+    """Return public news of these splits, newest first."""
     return sorted([*_entries(splits), *_editions()], key=itemgetter(0), reverse=True)[:N_NEWS]
 
 

@@ -1,4 +1,4 @@
-"""The audit log for maintainers: a page with its filter, and its export."""
+"""The audit log for maintainers: a page with filters, and its export."""
 
 import itertools
 import json
@@ -38,7 +38,7 @@ def _occurring(name: str) -> list[tuple[str, str]]:
 
 
 class AuditFilter(SiteForm):
-    """By whom, what, to what, and when (days of UTC, both included)."""
+    """Actor, verb, noun, and days in UTC, both included."""
 
     actor = forms.CharField(label="Actor (part of the email address)", required=False, max_length=254)
     verb = forms.ChoiceField(label="Action", required=False, choices=partial(_occurring, "verb"))
@@ -68,7 +68,6 @@ DIGEST: Final = re.compile(r"(sha256:[0-9a-f]{8})[0-9a-f]{56}")
 @maintainers_only
 @require_safe
 def events(request: HttpRequest) -> HttpResponse:
-    """List the audit events that fit the filter, the newest first."""
     asked = AuditFilter(request.GET)
     if not asked.is_valid():
         return render(request, "maintain/audit.html", {"form": asked}, status=400)
@@ -82,7 +81,7 @@ def events(request: HttpRequest) -> HttpResponse:
 @maintainers_only
 @require_safe
 def export(request: HttpRequest) -> HttpResponse | StreamingHttpResponse:
-    """Every event that fits, as JSON; `details` as the hash has them."""
+    """Export matching events as JSON; `details` as they were hashed."""
     asked = AuditFilter(request.GET)
     if not asked.is_valid():
         return render(request, "maintain/audit.html", {"form": asked}, status=400)
@@ -94,7 +93,6 @@ def export(request: HttpRequest) -> HttpResponse | StreamingHttpResponse:
 
 
 def _readable_details(event: AuditEvent, names: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Return the details for a reader: digests by their beginning, and no empty values."""
     details = {
         name: ", ".join(map(str, value)) if isinstance(value, list) else value
         for name, value in event.details.items()
@@ -103,7 +101,7 @@ def _readable_details(event: AuditEvent, names: Mapping[str, str]) -> list[tuple
 
 
 def _rows(asked: AuditFilter) -> Iterator[dict[str, Any]]:
-    """Every event that fits, a few at a time: a trail is as long as the site is old."""
+    # A few at a time: the log grows with the site's age.
     events = audit.events(**asked.wanted()).iterator(chunk_size=1000)
     while some := list(itertools.islice(events, 1000)):
         names = audit.names_in(some)

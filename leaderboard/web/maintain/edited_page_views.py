@@ -1,4 +1,4 @@
-"""Editing rules, contact, privacy, imprint and licence."""
+"""Editing of rules, contact, privacy, imprint and licence."""
 
 from typing import Any
 
@@ -22,8 +22,6 @@ from leaderboard.web.maintain.maintainer_views import (
 
 
 class PageForm(SiteForm):
-    """The text of a page, and the version that was edited."""
-
     text = forms.CharField(
         strip=False,
         help_text="Markdown: ## headings, lists, tables, **bold**, [links](https://…). HTML is shown as text "
@@ -40,14 +38,13 @@ class PageForm(SiteForm):
 @maintainers_only
 @require_safe
 def site_pages(request: HttpRequest) -> HttpResponse:
-    """Every page, and when it was changed."""
     rows = [(page, texts.current(page.name)) for page in PAGES.values()]
     return render(request, "maintain/pages.html", {"rows": rows, "imprint": texts.IMPRINT})
 
 
 @maintainers_form
 def site_page(request: HttpRequest, page_name: str) -> HttpResponse:
-    """The form with the text of a page, or with one that it had; a preview; the texts until now."""
+    """Show the form with a version of the text, a preview, and the history."""
     versions = texts.versions(page_name)
     chosen = next((each for each in versions if str(each.number) == request.GET.get("version")), None)
     shown = chosen or (versions[0] if versions else None)

@@ -21,8 +21,6 @@ def reason_field(help_text: str, *, at: str = "audit log", max_length: int = 100
 
 
 class OpenForm(SiteForm):
-    """Which ground truth and which protocol a new edition is to have."""
-
     digest = forms.ChoiceField(
         label="Ground truth",
         error_messages={
@@ -53,7 +51,7 @@ class ReasonForm(SiteForm):
 
 
 class RollBackForm(ReasonForm):
-    """A reason, and the number of the edition that was the board when the maintainer looked."""
+    """A reason, and the number of the edition that the maintainer saw as the board."""
 
     replaces = forms.IntegerField(
         widget=forms.HiddenInput, error_messages={"required": _STALE, "invalid": _STALE}
@@ -61,7 +59,7 @@ class RollBackForm(ReasonForm):
 
 
 class PublishForm(RollBackForm):
-    """The same, and whether what is unfinished or newly rejected is knowingly left out."""
+    """Also whether unfinished or newly rejected submissions may be left out."""
 
     leave_out = forms.BooleanField(required=False)
 

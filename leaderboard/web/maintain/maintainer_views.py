@@ -34,7 +34,7 @@ View = Callable[..., HttpResponseBase]
 
 
 def maintainers_only(view: View) -> View:
-    """Let maintainers in, uncached; a visitor signs in first, for others the page does not exist."""
+    """Let maintainers in, uncached; a visitor signs in first, others get a 404."""
     uncached = never_cache(view)
 
     @wraps(view)
@@ -61,7 +61,7 @@ def maintainers_form(view: View) -> View:
 @maintainers_only
 @require_safe
 def hub(request: HttpRequest) -> HttpResponse:
-    """Show the maintainers' overview: every split with its board, editions in preparation and failures."""
+    """Show every split with its board, editions in preparation and failures."""
     splits = Split.objects.select_related("current_edition__ground_truth")
     desks = [
         (desk, [edition_tables.running(*each) for each in desk["in_preparation"]])
@@ -81,7 +81,6 @@ def hub(request: HttpRequest) -> HttpResponse:
 
 @maintainers_form
 def open_edition(request: HttpRequest, split: str) -> HttpResponse:
-    """Open a draft edition and queue every active submission for it."""
     split_row = get_object_or_404(Split.objects.select_related("current_edition__ground_truth"), pk=split)
     form = OpenForm.asked(request, split=split_row)
     if form.is_valid():
@@ -97,7 +96,6 @@ def open_edition(request: HttpRequest, split: str) -> HttpResponse:
 @maintainers_only
 @require_safe
 def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    """Show what publishing an edition would change, and how far its re-scoring is."""
     row = _edition(split, number)
     context = {**_comparison(row), "predecessor": corrections.predecessor(row.split)}
     return render(request, "maintain/edition.html", context)
@@ -130,7 +128,6 @@ def preview_csv(request: HttpRequest, split: str, number: int) -> HttpResponse:
 
 @maintainers_form
 def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    """Make an edition the board."""
     row = _edition(split, number)
     context = _comparison(row)
     form = PublishForm.asked(request, initial={"replaces": context["preview"].replaces})
@@ -148,7 +145,6 @@ def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
 
 @maintainers_form
 def roll_back(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    """Make the edition that this one replaced the board again."""
     row = _edition(split, number)
     former = corrections.predecessor(row.split)
     form = RollBackForm.asked(request, initial={"replaces": number})
@@ -167,7 +163,6 @@ def roll_back(request: HttpRequest, split: str, number: int) -> HttpResponse:
 
 @maintainers_form
 def discard(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    """Give up an edition in preparation."""
     row = _edition(split, number)
     form = DiscardForm.asked(request)
     if form.is_valid():

@@ -1,4 +1,4 @@
-"""Moderation for maintainers: a team with its people, methods and entries; each action has its own page."""
+"""Moderation for maintainers: a team with its people, methods and entries; each action has a page."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -71,7 +71,7 @@ _RENAMED: Final = (
 
 @dataclass(frozen=True)
 class Action:
-    """Something that a maintainer does to an object of others: what the page says, and what is done."""
+    """An action of a maintainer: the words of its page, and its function."""
 
     model: type[Team | Method | Submission | User]
     heading: str
@@ -196,7 +196,6 @@ ACTIONS: Final[Mapping[str, Action]] = {
 @maintainers_only
 @require_safe
 def team(request: HttpRequest, team_id: UUID) -> HttpResponse:
-    """A team: its people, methods and submissions, and what can be done about each."""
     row = get_object_or_404(Team, pk=team_id)
     sent = Submission.objects.filter(method__team=row).select_related("method")
     context = {
@@ -219,7 +218,6 @@ def _with_states(sent: Iterable[Submission]) -> list[Submission]:
 
 @maintainers_form
 def action(request: HttpRequest, action_name: str, subject_id: str) -> HttpResponse:
-    """Show what an action does, ask for the reason, and do it."""
     if action_name not in ACTIONS:
         raise Http404
     chosen = ACTIONS[action_name]

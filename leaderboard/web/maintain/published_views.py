@@ -1,4 +1,4 @@
-"""Rows quoted from papers, for maintainers: those on the boards, and a form that adds a paper's."""
+"""Published results, for maintainers: those on the boards, and a form to add a paper's."""
 
 from typing import Any
 
@@ -42,14 +42,14 @@ class PaperForm(SiteForm):
         super().__init__(*((request.POST, request.FILES) if request.method == "POST" else sent))
 
     def refuse(self, refusal: Exception) -> None:
-        """Put every problem of the document at its field."""
+        """Show every problem of the document at its field."""
         for problem in refusal.problems if isinstance(refusal, BadDocument) else ():
             self.add_error("file", problem)
         if not isinstance(refusal, BadDocument):
             super().refuse(refusal)
 
     def document(self) -> dict[str, Any]:
-        """Return the document that was sent. Raises `BadDocument`."""
+        """Parse the document. Raises `BadDocument`."""
         return papers.parse(self.cleaned_data["file"].read(papers.MAX_BYTES + 1))
 
 
@@ -59,7 +59,6 @@ class RemovalForm(SiteForm):
 
 @maintainers_form
 def remove(request: HttpRequest, split: str, slug: str) -> HttpResponse:
-    """Take a quoted row off the board."""
     row = get_object_or_404(PublishedResult, split=split, slug=slug, replaced_at=None)
     form = RemovalForm.asked(request)
     if form.is_valid():
@@ -78,7 +77,6 @@ def remove(request: HttpRequest, split: str, slug: str) -> HttpResponse:
 
 @maintainers_form
 def published(request: HttpRequest) -> HttpResponse:
-    """The quoted rows with the day since which they stand; more of them."""
     form = PaperForm(request)
     if form.is_valid():
         try:

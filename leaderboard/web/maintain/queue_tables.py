@@ -19,7 +19,7 @@ PER_SECTION: Final = 20
 
 
 class State(NamedTuple):
-    """One of the three lists. Without an order, its rows stand as workers take them."""
+    """One of three lists; without an order, its rows are in the workers' order."""
 
     status: Status
     heading: str
@@ -34,7 +34,7 @@ STATES: Final[Mapping[str, State]] = {
 
 
 def totals(*, split: str = "") -> dict[str, Any]:
-    """How many there are in each list, and how long the oldest that waits has waited."""
+    """Count each list, and return the longest waiting time."""
     queue = Evaluation.objects.filter(status__in=[state.status for state in STATES.values()])
     queue = queue.filter(submission__split=split) if split else queue
     rows = queue.order_by().values_list("status").annotate(n=Count("pk"), oldest_at=Min("queued_at"))
@@ -46,7 +46,7 @@ def totals(*, split: str = "") -> dict[str, Any]:
 
 
 def queue_table(*, state: str = "", split: str = "", number: Any = 1) -> dict[str, Any]:
-    """The beginning of each list, or with `state` page `number` of that one.
+    """Return the beginning of each list, or page `number` of one.
 
     `seen` changes when a row or a count does.
     """
@@ -71,7 +71,7 @@ def queue_table(*, state: str = "", split: str = "", number: Any = 1) -> dict[st
 
 
 def _listed(state: State, *, split: str) -> QuerySet[Evaluation]:
-    """One of the lists, without the columns that are large and not shown."""
+    # Without the columns that are large and not shown.
     rows = Evaluation.objects.filter(status=state.status)
     rows = rows.order_by(*state.order) if state.order else rows.in_turn()
     rows = rows.filter(submission__split=split) if split else rows
@@ -80,7 +80,7 @@ def _listed(state: State, *, split: str) -> QuerySet[Evaluation]:
 
 
 def _until(evaluation: Evaluation, *, now: datetime) -> datetime | None:
-    """Running: the end of the lease; waiting: not to be begun before. None where that moment is over."""
+    """Return the end of the lease, or the earliest start, if in the future."""
     is_running = evaluation.status == Status.RUNNING
     until = evaluation.leased_until if is_running else evaluation.due_at
     return until if until and until > now else None
@@ -96,7 +96,7 @@ def _tags(evaluation: Evaluation) -> Iterable[str]:
 
 
 def strike_words(evaluation: Evaluation) -> str:
-    """How many of its runs came to nothing, and by what; empty if none did.
+    """Count failed runs by cause; empty if none failed.
 
     >>> strike_words(Evaluation(n_poison_strikes=2))
     'poison 2 of 3'

@@ -1,4 +1,4 @@
-"""The queue for maintainers: system errors, running and waiting evaluations, and their retry."""
+"""The queue for maintainers, and retries."""
 
 from typing import Any
 
@@ -35,8 +35,6 @@ class QueueFilter(SiteForm):
 
 
 class RetryForm(forms.Form):
-    """Which evaluations to queue again: at most a page of them."""
-
     evaluation = forms.ModelMultipleChoiceField(
         queryset=Evaluation.objects.defer("report", "problems"),
         error_messages={
@@ -49,7 +47,6 @@ class RetryForm(forms.Form):
 @maintainers_only
 @require_safe
 def queue(request: HttpRequest) -> HttpResponse:
-    """The three lists, or one of them page by page."""
     return _page(request)
 
 
@@ -69,7 +66,6 @@ def queue_state(request: HttpRequest) -> HttpResponse:
 @maintainers_only
 @require_POST
 def retry(request: HttpRequest) -> HttpResponse:
-    """Queue again system errors, and go back to the list that it was chosen from."""
     form = RetryForm(request.POST)
     if not form.is_valid():
         return _page(request, status=422, refusals=form.errors["evaluation"])

@@ -1,4 +1,4 @@
-"""Forms of quotas: find a team, override its rules, end the override."""
+"""Forms of quotas and admissions."""
 
 from datetime import timedelta
 from typing import Any, Final
@@ -21,13 +21,13 @@ class TeamLookup(SiteForm):
 
 
 class SpanField(forms.CharField):
-    """A span of time in the words in which `spans.span` says it."""
+    """A span of time as `spans.span` words it."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(max_length=40, **options)
 
     def clean(self, value: Any) -> timedelta:
-        """The span; none at all where nothing may be filled in. Raises `ValidationError`."""
+        """Parse the span; empty is none. Raises `ValidationError`."""
         text: str = super().clean(value)
         try:
             time = parse_span(text) if text else timedelta(0)
@@ -39,7 +39,6 @@ class SpanField(forms.CharField):
 
 
 def _count_field(name: str, label: str, help_text: str) -> forms.IntegerField:
-    """A limit that may be left out; `name` is its field in `QuotaRules`."""
     return forms.IntegerField(
         label=label,
         required=False,
@@ -56,8 +55,6 @@ def _count_field(name: str, label: str, help_text: str) -> forms.IntegerField:
 
 
 class QuotaRulesForm(SiteForm):
-    """Four limits of a team. The names are those of `QuotaRules`."""
-
     quota_limit = _count_field(
         "quota_limit", "Submissions", "Of a team, within the window. Empty: no limit; 0: none."
     )
@@ -77,13 +74,11 @@ class QuotaRulesForm(SiteForm):
 
 
 class OverrideForm(QuotaRulesForm):
-    """The limits of one team on a split, and why it has them."""
-
     reason = reason_field(_FOR_MAINTAINERS, max_length=500)
 
     @staticmethod
     def filled_with(rules: QuotaRules) -> dict[str, Any]:
-        """Return what the form shows at first: rules as they are, without their reason."""
+        """Return the initial values: rules without their reason."""
         return {
             "quota_limit": rules.quota_limit,
             "quota_window": span(rules.quota_window),
@@ -92,11 +87,11 @@ class OverrideForm(QuotaRulesForm):
         }
 
     def rules(self) -> dict[str, Any]:
-        """Return the cleaned fields under the names of `rules.override`."""
+        """Return the cleaned fields under the names of `usage.override`."""
         return {name.removeprefix("quota_"): value for name, value in self.cleaned_data.items()}
 
 
 class EndForm(SiteForm):
-    """Why a team's own rules end, or its admission begins or ends."""
+    """The reason why a team's own rules end, or its admission begins or ends."""
 
     reason = reason_field(_FOR_MAINTAINERS, max_length=500)

@@ -1,4 +1,4 @@
-"""Quotas in words: rules of splits and teams, and the slots that a team has left."""
+"""Quotas in words: rules, and the slots that a team has left."""
 
 from datetime import datetime
 from typing import Any
@@ -17,7 +17,7 @@ MAX_MATCHES = 50
 
 
 def rules_of(row: QuotaRules) -> dict[str, str]:
-    """The rules of a split or of a team on it, in words, one by one and in a sentence."""
+    """Word the rules of a split or team, one by one and in a sentence."""
     return {
         "limit": _most(row.quota_limit),
         "window": span(row.quota_window),
@@ -28,14 +28,12 @@ def rules_of(row: QuotaRules) -> dict[str, str]:
 
 
 def sentence_of(row: QuotaRules) -> str:
-    """Rules as part of a sentence.
+    """Word rules as part of a sentence.
 
     >>> from datetime import timedelta
     >>> from leaderboard.models import Split
     >>> sentence_of(Split(quota_limit=3, quota_window=timedelta(days=30), quota_rejected_limit=None))
     '3 submissions within 30 days; any number of rejected or cancelled files'
-    >>> sentence_of(Split(quota_limit=None, quota_min_gap=timedelta(hours=1), quota_rejected_limit=20))
-    'any number of submissions, at least 1 hour apart; 20 rejected or cancelled files within 24 hours'
     """
     sent = turned_away = "any number of"
     within = within_a_day = ""
@@ -50,7 +48,7 @@ def sentence_of(row: QuotaRules) -> str:
 
 
 def team_rows(team: Team, *, viewer: User, now: datetime) -> list[dict[str, Any]]:
-    """The team on every split: the rules that hold for it, and what it has left of them."""
+    """Return the team's rules and what it has left, for every split."""
     own = {row.split_id: row for row in team.quota_overrides.select_related("set_by")}
     admitted = {row.split_id: row for row in team.admissions.all()}
     return [
@@ -77,7 +75,7 @@ def teams_like(text: str) -> list[Team]:
 
 
 def people_alone(text: str) -> QuerySet[User]:
-    """Accounts with this text in their address that are in no team."""
+    """Return accounts without a team with this text in their address."""
     alone = User.objects.filter(email__icontains=text, membership=None)
     return alone.exclude(email__endswith=f"@{forgetting.NOWHERE}").order_by("email")[:MAX_MATCHES]
 

@@ -1,4 +1,4 @@
-"""Quotas for maintainers: rules, overrides, and the slots that a team has left."""
+"""Quotas for maintainers: rules, overrides, admissions."""
 
 from uuid import UUID
 
@@ -27,7 +27,6 @@ PER_PAGE = 50
 @maintainers_only
 @require_safe
 def quota_rules(request: HttpRequest) -> HttpResponse:
-    """The rules of every split, the teams that have others, and a way to look up a team."""
     lookup = TeamLookup(request.GET)
     text = lookup.cleaned_data["team"] if lookup.is_valid() else ""
     matches = quota_tables.teams_like(text) if text else []
@@ -51,7 +50,6 @@ def quota_rules(request: HttpRequest) -> HttpResponse:
 @maintainers_only
 @require_safe
 def team_quotas(request: HttpRequest, team_id: UUID) -> HttpResponse:
-    """Show what a team has used and has left on every split, and the rules that apply."""
     team = get_object_or_404(Team, pk=team_id)
     rows = quota_tables.team_rows(team, viewer=maintainer_of(request), now=timezone.now())
     context = {"team": team, "people": team.members.order_by("email"), "rows": rows}
@@ -60,7 +58,6 @@ def team_quotas(request: HttpRequest, team_id: UUID) -> HttpResponse:
 
 @maintainers_form
 def override(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
-    """Give a team rules of its own on a split, or others than it has."""
     team, split_row = get_object_or_404(Team, pk=team_id), get_object_or_404(Split, pk=split)
     own = QuotaOverride.objects.filter(team=team, split=split_row).select_related("set_by").first()
     form = OverrideForm.asked(request, initial=OverrideForm.filled_with(own or split_row))
@@ -79,7 +76,6 @@ def override(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
 
 @maintainers_form
 def end_override(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
-    """Let the split's rules hold for a team again."""
     rows = QuotaOverride.objects.select_related("team", "split", "set_by")
     own = get_object_or_404(rows, team=team_id, split=split)
     form = EndForm.asked(request)
@@ -94,7 +90,6 @@ def end_override(request: HttpRequest, team_id: UUID, split: str) -> HttpRespons
 
 @maintainers_form
 def admit(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
-    """Admit a team to a split."""
     team, split_row = get_object_or_404(Team, pk=team_id), get_object_or_404(Split, pk=split)
     form = EndForm.asked(request)
     if form.is_valid():
@@ -113,7 +108,6 @@ def admit(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
 
 @maintainers_form
 def end_admission(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
-    """Take the admission of a team back."""
     row = get_object_or_404(Admission.objects.select_related("team"), team=team_id, split=split)
     form = EndForm.asked(request)
     if form.is_valid():

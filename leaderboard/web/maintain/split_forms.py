@@ -1,4 +1,4 @@
-"""Forms of splits: add one, change what can be changed about it."""
+"""Forms of splits and of the site's announcement."""
 
 from dataclasses import asdict
 from datetime import datetime
@@ -30,8 +30,6 @@ _SECTIONS: Final = (
 
 
 class MomentField(forms.CharField):
-    """A date with time and zone, or nothing."""
-
     def __init__(self, label: str, help_text: str) -> None:
         attrs = {"placeholder": deadlines.EXAMPLE, "autocomplete": "off"}
         super().__init__(
@@ -43,7 +41,6 @@ class MomentField(forms.CharField):
         )
 
     def clean(self, value: Any) -> datetime | None:
-        """The moment. Raises `ValidationError`."""
         text: str = super().clean(value)
         try:
             return deadlines.parse(text) if text else None
@@ -52,7 +49,7 @@ class MomentField(forms.CharField):
 
 
 class PolicyForm(QuotaRulesForm):
-    """What maintainers decide about a split. The names are those of `Policy`."""
+    """The fields of `Policy`."""
 
     title = forms.CharField(
         max_length=80, error_messages={"required": "No title was given; expected one like Validation."}
@@ -96,7 +93,7 @@ class PolicyForm(QuotaRulesForm):
     )
 
     def sections(self) -> list[tuple[str, list[forms.BoundField]]]:
-        """The fields as the page shows them: each heading with those below it."""
+        """Return headings with their fields."""
         below = {name: title for title, names in _SECTIONS for name in names}
         by_title: dict[str, list[forms.BoundField]] = {"": [], **{title: [] for title, _ in _SECTIONS}}
         for field in self:
@@ -119,7 +116,7 @@ class PolicyForm(QuotaRulesForm):
 
 
 class NewSplitForm(PolicyForm):
-    """The same, and what stays as it is: its name, and where its ground truth comes from."""
+    """Also what stays as it is: its name, and where its ground truth comes from."""
 
     name = forms.CharField(
         max_length=32,
@@ -156,7 +153,7 @@ class NewSplitForm(PolicyForm):
 
 
 class AnnouncementForm(SiteForm):
-    """A line for all splits, and when it ends. The names are those of `policy.announce`."""
+    """The arguments of `policy.announce`."""
 
     announcement = forms.CharField(
         required=False,

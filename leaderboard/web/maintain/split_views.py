@@ -1,4 +1,4 @@
-"""Splits for maintainers: all of them, a new one, the policy of one, and a mail to its teams."""
+"""Splits for maintainers: list, new split, policy, announcements."""
 
 from django import forms
 from django.contrib import messages
@@ -27,7 +27,6 @@ from leaderboard.web.maintain.split_forms import AnnouncementForm, NewSplitForm,
 @maintainers_only
 @require_safe
 def splits(request: HttpRequest) -> HttpResponse:
-    """Every split, also those that are switched off."""
     now = timezone.now()
     rows = [
         (split, admissions.sentence_of(split, now=now) or "Open.", quota_tables.sentence_of(split))
@@ -38,7 +37,6 @@ def splits(request: HttpRequest) -> HttpResponse:
 
 @maintainers_form
 def add(request: HttpRequest) -> HttpResponse:
-    """Make a split."""
     form = NewSplitForm.asked(request, initial=PolicyForm.filled_with(policy.FIRST_POLICY))
     if form.is_valid():
         with form.refusals():
@@ -50,7 +48,6 @@ def add(request: HttpRequest) -> HttpResponse:
 
 @maintainers_form
 def change(request: HttpRequest, split: str) -> HttpResponse:
-    """Change the policy of a split."""
     split_row = get_object_or_404(Split, pk=split)
     form = PolicyForm.asked(request, initial=PolicyForm.filled_with(policy.policy_of(split_row)))
     if form.is_valid():
@@ -63,7 +60,6 @@ def change(request: HttpRequest, split: str) -> HttpResponse:
 
 @maintainers_form
 def announcement(request: HttpRequest) -> HttpResponse:
-    """Show a line on the pages of every split, or take it away."""
     current = PageVersion.announcement().first()
     initial = (
         {"announcement": current.text, "announcement_ends_at": deadlines.written(current.ends_at)}
@@ -81,7 +77,7 @@ def announcement(request: HttpRequest) -> HttpResponse:
 
 
 class MailForm(SiteForm):
-    """The text of an announcement. The names are those of `announcements.written`."""
+    """The arguments of `announcements.written`."""
 
     subject = forms.CharField(
         max_length=announcements.MAX_SUBJECT,
@@ -100,7 +96,7 @@ class MailForm(SiteForm):
 
 @maintainers_form
 def mail(request: HttpRequest, split: str) -> HttpResponse:
-    """Write a mail to the teams of a split, preview it, and send it: each is a step of one form."""
+    """Write, preview and send a mail to the teams of a split: steps of one form."""
     split_row = get_object_or_404(Split, pk=split)
     step = request.POST.get("step", "")
     if step == "write":
@@ -126,7 +122,7 @@ def _preview(request: HttpRequest, announcement: Announcement) -> HttpResponse:
 
 
 def _sent(request: HttpRequest, announcement: Announcement) -> HttpResponse:
-    """Send it, and say to how many. A second click finds nobody who has not got it."""
+    # After a second click nobody is left to get it.
     n_people = announcements.announce(announcement, now=timezone.now(), actor=maintainer_of(request))
     if n_people:
         messages.success(request, f"The mail to {counted(n_people, 'person', 'people')} is queued.")

@@ -1,4 +1,4 @@
-"""Forms of a method: its details and its visibility. The domain function refuses wrong values."""
+"""Forms of a method: its details and its visibility."""
 
 from datetime import UTC, datetime
 from typing import Any, Final
@@ -15,37 +15,32 @@ _NOT_SPECIFIED: Final = ("", "not specified")
 
 
 class DetailsForm(DescriptionForm):
-    """The description of a method, its links, and every detail of the registry. Empty: not specified."""
+    """Description, links, and every detail of the registry."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
-        """With a field for each detail of the registry, which a subclass that lists them could not follow."""
+        # Subclasses that list fields of the registry could not follow it.
         super().__init__(*args, **options)
         self.fields |= {detail.name: _field_of(detail) for detail in DETAILS}
 
     @property
     def described(self) -> list[forms.BoundField]:
-        """The fields of texts and links."""
         return [self[name] for name in DescriptionForm.base_fields]
 
     @property
     def detailed(self) -> list[forms.BoundField]:
-        """The fields of the registry."""
         return [self[detail.name] for detail in DETAILS]
 
 
 class MethodForm(DetailsForm):
-    """Everything that a team says of a method."""
-
     name = forms.CharField(required=False, widget=forms.TextInput(attrs={"maxlength": 80}))
     field_order = ["name"]
 
     @classmethod
     def of_method(cls, request: HttpRequest, *, method: Method) -> "MethodForm":
-        """The form with what was sent, or with what is stated now."""
         return cls.asked(request, initial=_stated(method))
 
     def changes(self) -> dict[str, object]:
-        """Return the fields that were sent, under the domain function's names; others stay as they are."""
+        """Return the posted fields; others stay as they are."""
         return {name: value for name, value in self.cleaned_data.items() if name in self.data}
 
 
@@ -72,7 +67,7 @@ def _stated(method: Method) -> dict[str, Any]:
 
 
 class ShowForm(SiteForm):
-    """The visibility of a method, and the confirmation of its team."""
+    """The visibility of a method, and its confirmation."""
 
     visibility = forms.CharField(
         required=False,
@@ -89,7 +84,7 @@ class ShowForm(SiteForm):
 
     @classmethod
     def of_method(cls, request: HttpRequest, *, method: Method) -> "ShowForm":
-        """The form as it was sent, or as the address asks to look at it."""
+        """Return the posted form, or the preview that the address asks for."""
         if request.method == "POST":
             return cls(request.POST)
         chosen = request.GET.get("visibility", "")
@@ -98,7 +93,7 @@ class ShowForm(SiteForm):
         return cls({"visibility": chosen, "reveal_on": request.GET.get("reveal_on", "")})
 
     def wanted(self) -> dict[str, Any]:
-        """Return the choice under the domain function's names: the day begins at midnight UTC."""
+        """Return the arguments of the domain function: the day begins at midnight UTC."""
         chosen, day = self.cleaned_data["visibility"], self.cleaned_data["reveal_on"]
         has_day = day is not None and chosen == Visibility.ANONYMOUS
         return {
@@ -107,7 +102,6 @@ class ShowForm(SiteForm):
         }
 
     def refuse(self, refusal: Exception) -> None:
-        """Put the refusal's sentence at the field that it is about."""
         if getattr(refusal, "field", "") == "reveal_at":
             self.add_error("reveal_on", str(refusal))
         else:

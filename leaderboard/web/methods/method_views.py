@@ -1,4 +1,4 @@
-"""The pages of a method: its results for everybody, its details and visibility for its team."""
+"""Pages of a method: results for everybody; details and visibility for its team."""
 
 from typing import cast
 from uuid import UUID
@@ -23,7 +23,6 @@ from leaderboard.web.methods.result_tables import edition_groups, method_result
 
 @require_safe
 def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
-    """A method: what it is, and what it achieved on each split."""
     rows = Method.objects.visible_to(request.user).select_related("team")
     row = get_object_or_404(rows, pk=method_id)
     achieved = results.results(method=row, viewer=request.user, splits=splits_of(request))
@@ -47,20 +46,17 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
 
 
 def _sent_to(request: HttpRequest, method: Method) -> Split | None:
-    """The split that the last file of a method was sent to: the board of one that has no score."""
     sent = Submission.objects.of(cast("User", request.user)).filter(method=method).select_related("split")
     last = sent.order_by("-submitted_at").first()
     return last.split if last else None
 
 
 def _own(request: HttpRequest, method_id: UUID) -> Method:
-    """One of the reader's own team's methods; any other is not there."""
     return get_object_or_404(Method.objects.of(request.user).select_related("team"), pk=method_id)
 
 
 @own_form
 def edit(request: HttpRequest, method_id: UUID) -> HttpResponse:
-    """Change the details of a method."""
     own = _own(request, method_id)
     form = MethodForm.of_method(request, method=own)
     if form.is_valid():
@@ -75,7 +71,7 @@ def edit(request: HttpRequest, method_id: UUID) -> HttpResponse:
 
 @own_form
 def delete(request: HttpRequest, method_id: UUID) -> HttpResponse:
-    """Delete an empty method after a page that explains it; for any other method say why it stays."""
+    """Delete an empty method after a page that explains it; for any other say why it stays."""
     own = _own(request, method_id)
     refusal = None
     if request.method == "POST":
@@ -92,7 +88,7 @@ def delete(request: HttpRequest, method_id: UUID) -> HttpResponse:
 
 @own_form
 def change_visibility(request: HttpRequest, method_id: UUID) -> HttpResponse:
-    """Choose who sees a method, look at what they would see, and show it."""
+    """Choose a visibility, preview it, and publish."""
     own = _own(request, method_id)
     now = timezone.now()
     form = ShowForm.of_method(request, method=own)

@@ -1,4 +1,4 @@
-"""Tables of results of methods and submissions: the numbers and the counts behind each."""
+"""Tables of results of methods and submissions, with the counts behind each number."""
 
 import itertools
 from collections.abc import Iterable, Mapping
@@ -35,24 +35,22 @@ _MAX_REASON: Final = 110
 
 @dataclass(frozen=True)
 class ResultGroup:
-    """One of the metrics of one result, and its columns."""
+    """A metric of one result, and its columns."""
 
     group: Group
     columns: tuple[tuple[Heading, Cell, str], ...]  # each with the number of sequences behind it
 
     @property
     def has_intervals(self) -> bool:
-        """Whether any of the values has one: without any, the row for them is left out."""
         return any(cell.interval for _, cell, _ in self.columns)
 
     @property
     def has_with_best(self) -> bool:
-        """Whether any is marked as one that may be the best: else the mark needs no explanation."""
         return any(cell.is_with_best for _, cell, _ in self.columns)
 
 
 def result_groups(entry: Entry, counts: Mapping[str, int]) -> tuple[ResultGroup, ...]:
-    """The numbers of one result, with the number of sequences behind each."""
+    """Return the numbers of one result, with the number of sequences behind each."""
     headings = [score_heading(name) for name in entry.scores]
     columns = iter(
         (heading, cell, grouped(counts.get(heading.caption)))
@@ -65,13 +63,12 @@ def result_groups(entry: Entry, counts: Mapping[str, int]) -> tuple[ResultGroup,
 
 
 def edition_groups(entry: Entry, edition: Edition) -> tuple[ResultGroup, ...]:
-    """The numbers of a row of an edition's board."""
     truth = edition.ground_truth
     return result_groups(entry, {OVERALL: truth.n_sequences, **truth.counts})
 
 
 def method_result(result: Result) -> dict[str, Any]:
-    """Return the result of a method on a split for its page; `compare_href` is empty without others."""
+    """Return the result of a method on a split for its page."""
     entry = result.entry
     return {
         "result": result,
@@ -103,7 +100,7 @@ def _compare_href(result: Result) -> str:
 
 
 def submission_table(submissions: Iterable[Submission]) -> dict[str, Any]:
-    """A team's submissions with their evaluation, their overall errors once scored, and why not if never."""
+    """Return the rows of a team's submissions: overall errors, or why there are none."""
     evaluations = [(submission, evaluation_of(submission)) for submission in submissions]
     errors = dict.fromkeys(metric for _, each in evaluations for metric in each.edition.rules.metrics)
     names = {metric.name: metric.symbol for metric in errors}

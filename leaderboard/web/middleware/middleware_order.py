@@ -1,4 +1,4 @@
-"""The middleware that each request passes, and the content that browsers may load."""
+"""The middleware of each request, and the content security policy."""
 
 from collections.abc import Iterable
 from typing import Any, Final
@@ -35,7 +35,7 @@ _PROVIDERS: Final = {"orcid": "https://orcid.org", "github": "https://github.com
 
 
 def content_security_policy(providers: Iterable[str]) -> dict[str, Any]:
-    """Return the content security policy: content from this site, forms to it and to these providers."""
+    """Return the policy: content from this site, forms to it and to these providers."""
     return {
         "DIRECTIVES": {
             "default-src": [NONE],

@@ -1,11 +1,8 @@
-"""Answers to anybody: what is the same for all readers without an account, kept while no board changes.
+"""A cache of answers that are the same for all anonymous readers (`http_caching.cacheable`).
 
-What such a reader sees changes only with the numbers of the boards (see `leaderboard/board_versions.py`) and
-with the day, so both are part of the key: a kept answer is current. A view says so with
-`http_caching.cacheable`.
-
-Each process has two bounded caches: one for plain addresses, and one for those with a query, so that what
-anybody can make up pushes out no plain page. Answers are kept compressed, an eighth of the memory.
+They change only with the boards' versions and the day, which are in the key, so a cached answer is current.
+Each process has two bounded caches, for plain addresses and for those with a query, so that invented queries
+push out no plain page. Answers are kept compressed, at an eighth of the memory.
 """
 
 import gzip
@@ -57,7 +54,7 @@ HEADER_OF_304: Final = "Cross-Origin-Resource-Policy"
 
 
 class PublicAnswer(NamedTuple):
-    """A cached answer: the digest of the bytes, the headers for everybody, and the bytes, compressed."""
+    """A cached answer: digest, headers, compressed bytes."""
 
     digest: str
     headers: dict[str, str]
@@ -65,8 +62,6 @@ class PublicAnswer(NamedTuple):
 
 
 class PublicAnswersMiddleware:
-    """Answers anybody from the cache, and keeps there what views of that kind answer."""
-
     def __init__(self, get_response: Next) -> None:
         self._get_response = get_response
 
@@ -95,7 +90,7 @@ class PublicAnswersMiddleware:
 
 
 def is_anybodys(request: HttpRequest) -> bool:
-    """Whether the request is an anonymous GET or HEAD of a whole page, under one of our host names."""
+    """Tell whether the request is an anonymous GET or HEAD of a whole page, under one of our host names."""
     return (
         request.method in {"GET", "HEAD"}
         and "HTTP_AUTHORIZATION" not in request.META
@@ -107,7 +102,7 @@ def is_anybodys(request: HttpRequest) -> bool:
 
 
 def _is_ours(request: HttpRequest) -> bool:
-    """Whether the site answers to the name that is asked; for another one, the layers refuse."""
+    # Other host names are refused by later layers.
     try:
         request.get_host()
     except DisallowedHost:
@@ -120,7 +115,6 @@ def _known_query(request: HttpRequest) -> str:
 
 
 def _may_be_kept(response: HttpResponseBase) -> bool:
-    """Whether the view says so, and the answer is whole and sets nothing for its one reader."""
     return is_cacheable(response) and response.status_code == 200 and not response.cookies
 
 
@@ -132,7 +126,7 @@ def _answer_of(response: HttpResponse) -> PublicAnswer:
 
 
 def _response(request: HttpRequest, kept: PublicAnswer) -> HttpResponse:
-    """The response to one reader: 304 if they have it, compressed if they take that."""
+    """Answer one reader: 304 if they have it, compressed if they accept that."""
     is_packed = _GZIP.search(request.META.get("HTTP_ACCEPT_ENCODING", "")) is not None
     etag = f'"{kept.digest}-gz"' if is_packed else f'"{kept.digest}"'
     response: HttpResponse

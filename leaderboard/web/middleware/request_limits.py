@@ -1,7 +1,4 @@
-"""Limits of requests, judged before any of the body is read: size and rate.
-
-The API has its own throttles (`leaderboard/api/throttling.py`), of the same kind and with the same words.
-"""
+"""Limits of size and rate, checked before the body is read. The API has its own throttles."""
 
 import math
 from collections.abc import Callable
@@ -38,7 +35,7 @@ class UploadLimitMiddleware:
 
 
 class SendThrottle(rate_limits.Throttle):
-    """Requests that send something, of one account, else of one address."""
+    """Writing requests of one account, else of one address."""
 
     rates, scope, cache = "PAGE_RATES", "send", cache
 
@@ -47,13 +44,13 @@ class SendThrottle(rate_limits.Throttle):
 
 
 class DrawThrottle(rate_limits.Throttle):
-    """Pages drawn for one address."""
+    """Pages rendered for one address."""
 
     rates, scope = "PAGE_RATES", "draw"
 
 
 class DrawAsOfThrottle(rate_limits.Throttle):
-    """Pages drawn of boards as of a time, for one address."""
+    """Pages of boards of the past, for one address."""
 
     rates, scope = "PAGE_RATES", "as_of"
 
@@ -62,7 +59,7 @@ class DrawAsOfThrottle(rate_limits.Throttle):
 
 
 class RateLimitMiddleware:
-    """Answers 429 to who does or draws too much on pages. What is answered from memory never comes here."""
+    """Answers 429 to too many requests; cached answers are not counted."""
 
     # The API counts by itself, and monitoring is not limited.
     ELSEWHERE: Final = ("/api/", "/healthz", "/readyz", "/healthy", "/metrics")

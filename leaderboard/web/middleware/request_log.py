@@ -18,14 +18,11 @@ SECRET_PATH = re.compile(r"^(/team/join/).+", re.DOTALL)
 
 
 class RequestLogMiddleware(RequestMiddleware):
-    """Binds `request_id` to every line, and counts every answer; it never asks the database."""
-
     def prepare(self, request: HttpRequest) -> None:
         request.META["tsttc.begun_s"] = time.perf_counter()
         super().prepare(request)
 
     def handle_response(self, request: HttpRequest, response: HttpResponse) -> None:
-        """Write the line, and put the id in the response."""
         _count(request, response)
         response["X-Request-ID"] = structlog.contextvars.get_contextvars().get("request_id", "")
         if request.path in QUIET and response.status_code < 500:
@@ -35,13 +32,13 @@ class RequestLogMiddleware(RequestMiddleware):
 
     @staticmethod
     def format_request(request: HttpRequest) -> str:
-        """Return method and path; left out are the query, which a person typed, and secrets."""
+        """Return method and path, without query and secrets."""
         path = SECRET_PATH.sub(r"\1…", request.path)
         return f"{request.method} {path}"
 
     @staticmethod
     def bind_user_id(request: HttpRequest) -> None:
-        """The account's number, if it is known already: a log line is no reason to look it up."""
+        # A log line is no reason to load the user.
         user = getattr(request, "_cached_user", None) or request.__dict__.get("user")
         # By type: asking a lazy object for its class would make it ask the database.
         if user is not None and type(user) is not SimpleLazyObject and user.pk is not None:
@@ -49,7 +46,7 @@ class RequestLogMiddleware(RequestMiddleware):
 
 
 def _count(request: HttpRequest, response: HttpResponse) -> None:
-    """Count the answer under the name of its route; what was answered from memory has none."""
+    # Cached answers have no route.
     if request.path in QUIET:
         return
     match = request.resolver_match

@@ -1,8 +1,7 @@
 """Headers of every response: caching, variation, and browser permissions.
 
-What says who asks (a session, a token) makes the answer that person's alone: `private, no-store`, also where
-the same page would be the same for everybody. What nobody in particular asks for may be kept by anybody who
-asks again whether it holds; a view that knows better, as the page cache does, says so itself.
+An answer to a session or token is `private, no-store`; any other may be revalidated, unless its view says
+more.
 """
 
 from collections.abc import Callable
@@ -34,8 +33,6 @@ PERMISSIONS: Final = ", ".join(
 
 
 class HeadersMiddleware:
-    """Gives each answer the headers that it has not got from its view."""
-
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponse]) -> None:
         self._get_response = get_response
 
@@ -60,7 +57,7 @@ class HeadersMiddleware:
 
 
 def _is_ones_own(request: HttpRequest, response: HttpResponse) -> bool:
-    """Whether the request says who asks, does something, or leaves something with the one who asked."""
+    """Tell whether the request identifies its user, changes something, or sets a cookie."""
     return (
         settings.SESSION_COOKIE_NAME in request.COOKIES
         or "HTTP_AUTHORIZATION" in request.META

@@ -26,13 +26,12 @@ _SIGN_IN_AGAIN: Final = (
 
 
 class SecondFactorMiddleware:
-    """Leads from the pages of maintainers to the missing step; elsewhere such a session is anybody's."""
+    """Redirects maintainers to the missing step; on other pages their session is an ordinary user's."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponse]) -> None:
         self._get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponse:
-        """Check the session as soon as its user is read."""
         if settings.REQUIRE_SECOND_FACTOR:
             user = request.user
             request.user = SimpleLazyObject(lambda: _marked(request, user))  # type: ignore[assignment]  # it is lazy, as Django's own
@@ -41,7 +40,6 @@ class SecondFactorMiddleware:
     def process_view(
         self, request: HttpRequest, view: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]
     ) -> HttpResponseBase | None:
-        """Redirect, or let the view answer."""
         # The user is asked for last: a probe with a session cookie must not need the database.
         if not _is_guarded(request) or not request.user.is_authenticated:
             return None
@@ -76,7 +74,7 @@ def _name(request: HttpRequest) -> str:
 
 
 def _is_guarded(request: HttpRequest) -> bool:
-    """Whether it is a page of maintainers, or the one that sets up the app."""
+    """Tell whether it is a page of maintainers, or the one that sets up the app."""
     name = _name(request)
     if request.resolver_match and request.resolver_match.namespace == "admin":
         return name != "logout"
@@ -90,7 +88,6 @@ def _marked(request: HttpRequest, user: User | AnonymousUser) -> User | Anonymou
 
 
 def _missing_step(request: HttpRequest, user: User) -> str:
-    """The route that a maintainer's session has to pass first; empty where nothing is missing."""
     if not second_factor.is_required(user):
         return ""
     given = {each.get("method") for each in get_authentication_records(request, user)}

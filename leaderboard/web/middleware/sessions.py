@@ -9,7 +9,6 @@ _KEY: Final = re.compile(r"[a-z0-9]{32}")
 
 
 class SessionStore(db.SessionStore):
-    """Takes no key that Django has not made: a cookie may hold what PostgreSQL has no text for."""
-
+    # A cookie may hold what PostgreSQL cannot store as text.
     def _validate_session_key(self, key: object) -> bool:
         return isinstance(key, str) and _KEY.fullmatch(key) is not None

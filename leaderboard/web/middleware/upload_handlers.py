@@ -1,8 +1,4 @@
-"""The upload handler: an upload goes to a file without a name, which vanishes with its process.
-
-Django's own temporary files have names: those of a process that is killed stay, and those that a full disk
-interrupts go on filling it until the garbage collector comes by.
-"""
+"""The upload handler: an upload goes to an unnamed file, which ends with its process."""
 
 import tempfile
 from contextlib import suppress
@@ -13,10 +9,8 @@ from django.core.files.uploadhandler import FileUploadHandler, TemporaryFileUplo
 
 
 class UnnamedFileUploadHandler(TemporaryFileUploadHandler):
-    """Streams an upload to the disk. Gives back its room at once if the disk is full."""
-
+    # Frees its room at once if the disk is full.
     def new_file(self, *args: Any, **kwargs: Any) -> None:
-        """Begin a file."""
         FileUploadHandler.new_file(self, *args, **kwargs)
         file = tempfile.TemporaryFile()  # noqa: SIM115 - the request closes it, or else this handler
         self.file = UploadedFile(  # type: ignore[assignment]  # Django's has a name
@@ -24,7 +18,6 @@ class UnnamedFileUploadHandler(TemporaryFileUploadHandler):
         )
 
     def receive_data_chunk(self, raw_data: bytes, start: int) -> None:
-        """Write a part of it. Raises `OSError` if there is no room."""
         try:
             self.file.write(raw_data)
         except OSError:
@@ -32,7 +25,6 @@ class UnnamedFileUploadHandler(TemporaryFileUploadHandler):
             raise
 
     def upload_interrupted(self) -> None:
-        """Forget what has come so far."""
         # Closing writes what is still in memory, for which there may be no room either.
         with suppress(OSError, AttributeError):
             self.file.close()

@@ -1,4 +1,4 @@
-"""The form of a submission. The domain function refuses wrong values, in the same words everywhere."""
+"""The forms of submissions; the domain function refuses wrong values."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -24,7 +24,7 @@ from leaderboard.web.methods.method_forms import DetailsForm
 
 @dataclass(frozen=True)
 class SplitChoice:
-    """A split to choose, and in a sentence what its team has left there, or why it takes nothing now."""
+    """A split to choose, with what its team has left or why it takes nothing."""
 
     split: Split
     is_open: bool
@@ -33,7 +33,6 @@ class SplitChoice:
 
 
 def offers_for(user: User, *, now: datetime) -> list[SplitChoice]:
-    """Every split as this person finds it."""
     team = teams.current_team_of(user=user)
     offers = []
     for split in Split.objects.shown().select_related("current_edition__ground_truth"):
@@ -48,7 +47,7 @@ def offers_for(user: User, *, now: datetime) -> list[SplitChoice]:
 
 
 class SubmissionForm(DetailsForm):
-    """A prediction file, its split and its method. The domain function refuses all but missing fields."""
+    """A prediction file, its split and its method."""
 
     split = forms.CharField(error_messages={"required": "No split was chosen; expected one of those listed."})
     method = forms.CharField(
@@ -106,24 +105,24 @@ class SubmissionForm(DetailsForm):
 
     @property
     def notices(self) -> list[str]:
-        """Which of the team's methods others see, each in a sentence; of a chosen one that alone."""
+        """Say which of the team's methods others see; or of the chosen one."""
         chosen = [method for method in self.methods if method.name == self["method"].value()]
         sentences = (visibility.notice_of(method) for method in chosen or self.methods)
         return [sentence for sentence in sentences if sentence]
 
     @property
     def options(self) -> list[tuple[str, str]]:
-        """Return the names of the team's methods to choose from, each with its notice."""
+        """Return the team's methods, each with its notice."""
         return [(method.name, visibility.notice_of(method)) for method in self.methods]
 
     @property
     def shows_details(self) -> bool:
-        """Whether the fields of details are open: for a first method, and where one has text or an error."""
+        """Tell whether the details are open: for a first method, and with text or an error."""
         fields = (*self.described, *self.detailed)
         return not self.methods or any(field.value() or field.errors for field in fields)
 
     def submission_request(self, *, now: datetime) -> SubmissionRequest:
-        """The submission that the valid form asks for."""
+        """Make the request of the valid form."""
         fields = self.cleaned_data
         return SubmissionRequest(
             user=self._user,
@@ -165,7 +164,7 @@ class SearchForm(forms.Form):
 
     @classmethod
     def of(cls, request: HttpRequest) -> Self:
-        """The form as the address asks; a method of others is as good as none."""
+        """Return the form of a query; ignore methods of others."""
         form = cls(request.GET)
         asked = parse_uuid(request.GET.get("method", ""))
         form.chosen_method = Method.objects.of(request.user).filter(pk=asked).first() if asked else None
@@ -189,7 +188,7 @@ class SearchForm(forms.Form):
 
     @property
     def address(self) -> str:
-        """The query that asks the same, to be followed by a page."""
+        """Return the query, to be followed by a page."""
         names = {"text": "q"}
         query = {names.get(name, name): value for name, value in self.wanted().items() if value}
         return f"{urlencode(query)}&" if query else ""

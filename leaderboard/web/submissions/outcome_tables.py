@@ -1,4 +1,4 @@
-"""Tables of a submission's page: numbers, rank, comparison with others, a row for a paper."""
+"""Tables of a submission's page: numbers, rank, comparison, a row for a paper."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -29,7 +29,7 @@ def outcome_table(
     interval_note: str,
     is_mine: bool,
 ) -> dict[str, Any] | None:
-    """A scored submission, ready to be placed; None for any other. `is_mine`: the reader's team's."""
+    """Return the tables of a scored submission; `is_mine`: of the reader's team."""
     if progress.scores is None:
         return None
     entry = Entry(
@@ -62,7 +62,7 @@ def outcome_table(
 
 
 def _order_words(names: Iterable[str]) -> str:
-    """The order of these scores.
+    """Word the order of these scores.
 
     >>> _order_words(["mid", "mid_small", "rte", "rte_small"])
     'MiD and RTE (each overall, small)'
@@ -100,7 +100,7 @@ def _comparison_rows(
 
 
 def _comparison_row(entry: Entry, other: Entry) -> dict[str, Any]:
-    """One row to compare with. Differences are this submission minus the row: below 0 it is better."""
+    # Differences are this submission minus the row: below 0 it is better.
     decimals, errors = max(entry.decimals, other.decimals), []
     for name, *_ in grouped_names(entry.scores).values():
         mine, theirs = entry.scores[name], other.scores[name]
@@ -111,7 +111,7 @@ def _comparison_row(entry: Entry, other: Entry) -> dict[str, Any]:
 
 
 def rejected_sentence(quota: Quota | None) -> str:
-    """Return what a rejected file costs, and how many more are accepted; empty without a quota.
+    """Word the cost of a rejected file, and how many more are accepted; empty without a quota.
 
     >>> from leaderboard.models import QuotaOverride
     >>> rejected_sentence(Quota("test", QuotaOverride(quota_rejected_limit=20), 0, 3, True, None, ""))

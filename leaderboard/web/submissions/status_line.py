@@ -1,4 +1,4 @@
-"""A submission's progress in words: the line of state, what was truncated, and which problems are listed."""
+"""A submission's progress: its status line, what was truncated, and its problems."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _ENDS: Final = {
 
 @dataclass(frozen=True)
 class Step:
-    """One station of the line. `state` is "done", "now" or "ahead"."""
+    """A step of the line. `state` is "done", "now" or "ahead"."""
 
     label: str
     state: str
@@ -32,10 +32,7 @@ class Step:
 
 @dataclass(frozen=True)
 class StateLine:
-    """The state of a submission for the template. `seen` changes exactly when the line of state does.
-
-    `is_moving`: there is more to come, and the page asks for it by itself.
-    """
+    """The status line. `seen` changes with it; `is_moving` pages poll."""
 
     steps: tuple[Step, ...]
     seen: str
@@ -46,7 +43,7 @@ class StateLine:
 
 
 def state_line(progress: Progress, *, awaits_intervals: bool = False) -> StateLine:
-    """A progress, ready to be drawn. `awaits_intervals`: scored, and its intervals are about to come."""
+    """Make the status line. `awaits_intervals`: scored, and its intervals are expected."""
     more = "-intervals" if awaits_intervals else ""
     problems = tuple(progress.problems[:MAX_POINTS])
     is_whole = len(problems) == progress.n_problems
@@ -61,7 +58,7 @@ def state_line(progress: Progress, *, awaits_intervals: bool = False) -> StateLi
 
 
 def steps(progress: Progress, *, awaits_intervals: bool = False) -> tuple[Step, ...]:
-    """Received → queued → running → how it ended (or is going to); of another edition's run see `_again`."""
+    """Return received → queued → running → the end; for another edition's run see `_again`."""
     if progress.first_run is not None:
         return _again(progress, progress.first_run, awaits_intervals=awaits_intervals)
     is_queued, is_running = progress.state == Status.QUEUED, progress.state == Status.RUNNING
@@ -85,7 +82,7 @@ def steps(progress: Progress, *, awaits_intervals: bool = False) -> tuple[Step, 
 
 
 def _again(progress: Progress, first: Evaluation, *, awaits_intervals: bool) -> tuple[Step, ...]:
-    """How the first run ended, then the run in the edition that counts: two runs, each with its own times."""
+    """Return the end of the first run, then the run in the present edition."""
     received = Step("Received", "done", progress.received_at)
     before = Step(_ENDS[Status(first.status)], "done", first.finished_at, f"edition {first.edition.number}")
     now_in = f"edition {progress.edition_number}"
@@ -99,12 +96,10 @@ def _again(progress: Progress, first: Evaluation, *, awaits_intervals: bool) -> 
 
 
 def truncation(truncated: Mapping[str, int]) -> str:
-    """Which predictions were moved to a boundary of the allowed range, in a sentence.
+    """Say how many predictions were truncated at each boundary.
 
     >>> truncation({"-20": 0, "0.05": 1, "20": 1200})
     '1,201 predictions lay outside the allowed range and were truncated: 1 to 0.05 s, 1,200 to 20 s.'
-    >>> truncation({"-20": 0})
-    'No prediction was truncated.'
     """
     moved = {boundary: n for boundary, n in truncated.items() if n}
     n_moved = sum(moved.values())

@@ -1,4 +1,4 @@
-"""The pages of submissions: the form, the list, one submission, its analysis, receipt and withdrawal."""
+"""Pages of submissions: form, list, one submission, analysis, receipt, withdrawal."""
 
 from typing import Any, cast
 from uuid import UUID
@@ -45,7 +45,6 @@ STOP_POLLING = 286
 
 @own_form
 def submit(request: HttpRequest) -> HttpResponse:
-    """Take a prediction file."""
     user = cast("User", request.user)
     form = SubmissionForm(user, request)
     if request.method == "POST" and form.is_valid():
@@ -61,7 +60,7 @@ def submit(request: HttpRequest) -> HttpResponse:
 
 
 def _taken(request: HttpRequest, taken: Submission) -> HttpResponse:
-    """Redirect to the submission's page; a script that follows the upload gets its address as JSON."""
+    """Redirect to the submission; a script gets its address as JSON."""
     if "application/json" in request.headers.get("Accept", ""):
         return JsonResponse({"page": reverse("submission", args=[taken.pk])}, status=201)
     return redirect("submission", taken.pk)
@@ -69,7 +68,7 @@ def _taken(request: HttpRequest, taken: Submission) -> HttpResponse:
 
 @require_safe
 def template(request: HttpRequest, split: str) -> HttpResponseBase:
-    """A prediction file of the split with all its anno_ids and no value, to be filled in."""
+    """Answer a file with all anno_ids of the split and no value, to be filled in."""
     edition = split_or_404(request, split).current_edition
     if edition is None:
         raise Http404
@@ -85,7 +84,6 @@ def template(request: HttpRequest, split: str) -> HttpResponseBase:
 
 @own_page
 def submission_list(request: HttpRequest) -> HttpResponse:
-    """List the submissions of the reader's own team."""
     evaluations = Evaluation.objects.select_related("edition").prefetch_related("scores")
     sent = (
         Submission.objects.of(cast("User", request.user))
@@ -100,7 +98,6 @@ def submission_list(request: HttpRequest) -> HttpResponse:
 
 @own_page
 def submission(request: HttpRequest, submission_id: UUID) -> HttpResponse:
-    """One submission: its state, then its result or its problems."""
     row, progress, now_shown = _looked_at(request, submission_id)
     return render(
         request, "submissions/submission.html", _outcome(request, row, progress) | {"shown": now_shown}
@@ -134,7 +131,6 @@ def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
 
 
 def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, Progress, StateLine]:
-    """A submission that the reader may see, and its line of state."""
     evaluations = Evaluation.objects.select_related("edition__ground_truth").prefetch_related("scores")
     rows = (
         Submission.objects.visible_to(request.user)
@@ -176,7 +172,6 @@ def _outcome(request: HttpRequest, row: Submission, progress: Progress) -> dict[
 
 @own_page
 def analysis(request: HttpRequest, submission_id: UUID) -> HttpResponse:
-    """Error by time to contact, its distribution, predicted against true, the worst recordings."""
     rows = Submission.objects.visible_to(request.user).select_related("method", "split__current_edition")
     row = get_object_or_404(rows, pk=submission_id, split__is_hidden=False)
     progress = progress_of(row)
@@ -192,13 +187,13 @@ def analysis(request: HttpRequest, submission_id: UUID) -> HttpResponse:
 @require_safe
 @cache_control(public=True, max_age=3600)
 def receipt_keys(request: HttpRequest) -> HttpResponse:
-    """The public halves of the keys that receipts were ever signed with, as a JSON Web Key Set."""
+    """Answer the public keys of receipts as a JSON Web Key Set."""
     return JsonResponse(receipts.public_keys(), content_type="application/jwk-set+json")
 
 
 @own_page
 def receipt(request: HttpRequest, submission_id: UUID) -> HttpResponse:
-    """The receipt of a score as a file, for the submission's own team."""
+    """Download the receipt of a score, as its team."""
     rows = Submission.objects.of(cast("User", request.user))
     row = get_object_or_404(rows.select_related("method__team", "split"), pk=submission_id)
     try:
