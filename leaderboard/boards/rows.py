@@ -207,8 +207,6 @@ def public_reason(problems: Iterable[Mapping[str, str]]) -> str:
 
     >>> public_reason([{"code": "not-finite"}, {"code": "missing-keys"}])
     'missing-keys'
-    >>> public_reason([{"code": "not-finite"}])
-    'other'
     """
     codes = (problem["code"] for problem in problems)
     return next((code for code in codes if code in _SHOWN_REASONS), OTHER_REASON)

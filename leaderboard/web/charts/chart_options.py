@@ -79,12 +79,7 @@ def method_href(entry: Entry) -> str:
 
 
 def error_text(metric: Metric, value: float | None, *, decimals: int) -> str:
-    """Format a value with its symbol.
-
-    >>> from evaluator.metrics.registry import MID
-    >>> error_text(MID, 14.3, decimals=2)
-    'MiD 14.30'
-    """
+    """Format a value with its symbol, as `MiD 14.30`."""
     return f"{metric.symbol} {format_rounded(value, decimals=decimals)}"
 
 
