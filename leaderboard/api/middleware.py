@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from django.http import HttpRequest, HttpResponse, HttpResponseNotModified
 
-from leaderboard.api.throttling import ApiThrottle, counted
+from leaderboard.api.throttling import counted
 from leaderboard.http_caching import is_known
 
 Next = Callable[[HttpRequest], HttpResponse]
@@ -23,17 +23,13 @@ class ApiHeadersMiddleware:
         response = _conditional(request, response)
         throttles = counted(request)
         if throttles:
-            response["RateLimit-Policy"] = ", ".join(_policy(each) for each in throttles)
-            response["RateLimit"] = ", ".join(_remaining(each) for each in throttles)
+            response["RateLimit-Policy"] = ", ".join(
+                f'"{each.scope}";q={each.num_requests};w={each.duration}' for each in throttles
+            )
+            response["RateLimit"] = ", ".join(
+                f'"{each.scope}";r={each.n_left};t={math.ceil(each.wait_s)}' for each in throttles
+            )
         return response
-
-
-def _policy(throttle: ApiThrottle) -> str:
-    return f'"{throttle.scope}";q={throttle.num_requests};w={throttle.duration}'
-
-
-def _remaining(throttle: ApiThrottle) -> str:
-    return f'"{throttle.scope}";r={throttle.n_left};t={math.ceil(throttle.wait_s)}'
 
 
 def _conditional(request: HttpRequest, response: HttpResponse) -> HttpResponse:

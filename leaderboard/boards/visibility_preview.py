@@ -44,7 +44,8 @@ def preview(*, method: Method, visibility: str, now: datetime) -> VisibilityPrev
     assuming_visible = copy(method)
     assuming_visible.visibility = visibility
     assuming_visible.shown_at = method.shown_at or now
-    others = _public_others(method)
+    public_others = Method.objects.filter(team=method.team_id, visibility=Visibility.PUBLIC)
+    others = set(public_others.exclude(pk=method.pk).values_list("pk", flat=True))
     sights = []
     splits = (
         Split.objects.shown().exclude(current_edition=None).select_related("current_edition__ground_truth")
@@ -71,11 +72,6 @@ def preview(*, method: Method, visibility: str, now: datetime) -> VisibilityPrev
         profile=profile_of(assuming_visible, is_masked=visibility == Visibility.ANONYMOUS),
         sights=tuple(sights),
     )
-
-
-def _public_others(method: Method) -> set[UUID]:
-    others = Method.objects.filter(team=method.team_id, visibility=Visibility.PUBLIC).exclude(pk=method.pk)
-    return set(others.values_list("pk", flat=True))
 
 
 def _rank_changes(

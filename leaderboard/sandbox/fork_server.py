@@ -131,7 +131,9 @@ class ForkServer:
         with ExitStack() as sent:
             for into in (reading.output, reading.complaint):
                 ours, end = os.pipe()
-                _widen(ours)
+                # Else the reader waits for us after each 64 KB.
+                with suppress(OSError):
+                    fcntl.fcntl(ours, _SET_PIPE_SIZE, _CHUNK_BYTES)
                 reading.follow(ours, into)
                 sent.callback(os.close, end)
                 theirs.append(end)
@@ -216,12 +218,6 @@ class _Reading:
         if "failed" in reply:
             raise NotStarted(reply["failed"])
         self._returncode = reply.get("returncode")
-
-
-def _widen(pipe: int) -> None:
-    # Else the reader waits for us after each 64 KB.
-    with suppress(OSError):
-        fcntl.fcntl(pipe, _SET_PIPE_SIZE, _CHUNK_BYTES)
 
 
 def _end(server: socket.socket, pid: int, owner: int) -> None:

@@ -37,7 +37,6 @@ class Orphan:
     name: str
     digest: str
     size_bytes: int
-    modified_at: datetime
 
 
 def orphans(*, now: datetime) -> Iterator[Orphan]:
@@ -50,7 +49,7 @@ def orphans(*, now: datetime) -> Iterator[Orphan]:
             except FileNotFoundError:
                 continue  # it was removed meanwhile
             if modified_at < now - MIN_AGE:
-                yield Orphan(name, digest, size_bytes, modified_at)
+                yield Orphan(name, digest, size_bytes)
 
 
 def remove(orphan: Orphan, *, now: datetime) -> bool:
@@ -100,10 +99,8 @@ def _remove_unnamed(digest: str) -> bool:
 
 
 def lock(digest: str) -> None:
-    """Prevent removal of a file of this digest until the transaction ends.
-
-    It is the first lock of its transaction, so that a removal never waits for a holder of other locks.
-    """
+    """Prevent removal of a file of this digest until the transaction ends; the transaction's first lock."""
+    # First, so that a removal never waits for a holder of other locks.
     _lock("pg_advisory_xact_lock_shared", digest)
 
 

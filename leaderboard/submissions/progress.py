@@ -47,17 +47,16 @@ class Progress:
 def evaluation_of(submission: Submission) -> Evaluation:
     """Return the evaluation in the published edition, else the latest, drafts last."""
     published = submission.split.current_edition_id
-    evaluations = sorted(submission.evaluations.all(), key=_edition_order)
+    evaluations = sorted(
+        submission.evaluations.all(),
+        key=lambda each: (each.edition.published_at is not None, each.edition.number),
+    )
     return next((e for e in evaluations if e.edition_id == published), evaluations[-1])
 
 
 def _first_run(submission: Submission, speaking: Evaluation) -> Evaluation | None:
     first = min(submission.evaluations.all(), key=lambda each: each.edition.number)
     return first if first.pk != speaking.pk and first.is_final else None
-
-
-def _edition_order(evaluation: Evaluation) -> tuple[bool, int]:
-    return evaluation.edition.published_at is not None, evaluation.edition.number
 
 
 def progress_of(submission: Submission) -> Progress:

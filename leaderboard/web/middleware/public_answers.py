@@ -72,7 +72,7 @@ class PublicAnswersMiddleware:
         at = request.GET.get("at", "")
         if at and not _DAY.fullmatch(at):
             return self._get_response(request)
-        query = _known_query(request)
+        query = urlencode([(name, text) for name in sorted(KNOWN) for text in request.GET.getlist(name)])
         request.known_query = query  # type: ignore[attr-defined]  # our own, as `user` is Django's
         # Before the view looks: what it reads may be newer than this number, and is never older.
         text = f"{path}?{query} {board_versions.sum_of_all()} {timezone.now():%Y-%m-%d}"
@@ -108,10 +108,6 @@ def _is_ours(request: HttpRequest) -> bool:
     except DisallowedHost:
         return False
     return True
-
-
-def _known_query(request: HttpRequest) -> str:
-    return urlencode([(name, text) for name in sorted(KNOWN) for text in request.GET.getlist(name)])
 
 
 def _may_be_kept(response: HttpResponseBase) -> bool:
