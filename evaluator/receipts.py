@@ -1,10 +1,10 @@
-"""Score receipts: JSON Web Tokens (RFC 7519) signed by EdDSA, for anybody to check offline.
-
-Scores are decimal texts with the edition's decimals (`"15.03"`): programs print numbers differently. The
-keys are a JSON Web Key Set (RFC 7517, RFC 8037), each named by its RFC 7638 thumbprint.
+"""Score receipts: JSON Web Tokens (RFC 7519) signed by EdDSA, checked offline.
 
     verified = verify(receipt_bytes, read_keys(keys_bytes))    # raises NotVerified
     verified.scores["mid"], verified.edition, verified.site
+
+Scores are decimal texts with the edition's decimals (`"15.03"`). The keys are a JSON Web Key Set (RFC 7517,
+RFC 8037), each named by its RFC 7638 thumbprint.
 """
 
 from __future__ import annotations
@@ -31,11 +31,10 @@ Document = dict[str, Any]
 
 
 class NotVerified(Exception):
-    """The receipt says nothing that one may rely on. `code` is stable; the text says what, found, expected.
+    """A receipt that proves nothing; `code` is stable.
 
-    `receipt-malformed`: no receipt. `receipt-version`: of a newer form. `receipt-keys`: the key set cannot be
-    read. `receipt-key-unknown`: signed by none of these keys. `receipt-altered`: the signature does not fit
-    what the receipt says.
+    `receipt-malformed`, `receipt-version` (a newer form), `receipt-keys` (an unreadable key set),
+    `receipt-key-unknown` (signed by another key) or `receipt-altered` (a wrong signature).
     """
 
     def __init__(self, code: str, message: str) -> None:
@@ -111,12 +110,11 @@ def _no_keys() -> dict[str, Ed25519PublicKey]:
 
 
 def encode(data: bytes) -> str:
-    """Bytes as base64url without padding."""
     return base64.urlsafe_b64encode(data).rstrip(b"=").decode()
 
 
 def decode(text: str) -> bytes:
-    """The bytes of a base64url text without padding. Raises `ValueError` for any other spelling of them."""
+    """Decode base64url without padding; raises `ValueError` for any other spelling."""
     data = base64.b64decode(text + "=" * (-len(text) % 4), altchars=b"-_", validate=True)
     if encode(data) != text:
         raise ValueError("not the canonical base64url text")

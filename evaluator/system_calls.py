@@ -1,9 +1,7 @@
-"""A seccomp filter of the system calls that a process may make while it reads untrusted bytes.
+"""A seccomp filter for a process that reads untrusted bytes."""
 
-The filter allows what a single thread needs that computes, reads what it has open, and writes its answer. All
-else is answered EPERM, so that a library that asks for more than it needs goes on without; a process of
-another architecture's calls ends.
-"""
+# It allows computing, reading open files and writing the answer. Other calls get EPERM, so that libraries
+# continue without them; calls of another architecture end the process.
 
 import ctypes
 import errno
@@ -70,10 +68,7 @@ def why_unavailable() -> str | None:
 
 
 def allow_only_reading() -> None:
-    """Let this thread make the calls of `ALLOWED` alone. Irrevocable.
-
-    Raises `OSError` if the kernel takes no filter.
-    """
+    """Allow this thread only the calls of `ALLOWED`, irrevocably; raises `OSError` if the kernel refuses."""
     program = program_for(os.uname().machine)
     filter_ = _Program(len(program) // 8, program)
     fault = _prctl(_PR_SET_NO_NEW_PRIVS, 1) or _prctl(_PR_SET_SECCOMP, _MODE_FILTER, ctypes.byref(filter_))

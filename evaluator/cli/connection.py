@@ -32,10 +32,8 @@ WORDS_OF_403 = frozenset({"token-scope", "token-split", "not-admitted"})
 
 @contextmanager
 def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator[Client]:
-    """A client for the site at `url`, with `token` or the one that is kept for it; raises Failure.
-
-    Before the token or a file goes anywhere, the site has to answer as a leaderboard.
-    """
+    """Open a client for the site at `url`, with `token` or the stored one; raises Failure."""
+    # The site must answer as a leaderboard before the token or a file is sent.
     bearer = token or (token_for(url) if with_token else None)
     from evaluator.client.answers import ClientError, Refused  # noqa: PLC0415 -- loads msgspec
 

@@ -14,10 +14,7 @@ from evaluator.problems import Problem, Rejected, n_problems_in_words
 
 
 class Failure(Exception):
-    """Ends the command: a sentence, what is wrong in the file where that is known, and what to do next.
-
-    `document` is what --json prints: by default in the shape of the API's errors, with the members of `more`.
-    """
+    """The end of a command: a message, the problems of the file, the next step, and `document` for --json."""
 
     def __init__(
         self,

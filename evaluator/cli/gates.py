@@ -81,7 +81,6 @@ def _condition(text: str) -> Condition:
 
 
 def fail_if_option(command: Command) -> Command:
-    """--fail-if: conditions on scores."""
     return click.option(
         "--fail-if",
         "fail_if",
@@ -133,7 +132,6 @@ def show_and_judge(
 
 
 def undecided(why: str) -> Failure:
-    """The failure of a gate for which something is missing."""
     return Failure(f"The gate cannot be evaluated: {why}.", exit_code=Exit.GATE, code="gate-undecided")
 
 
@@ -141,10 +139,8 @@ def undecided(why: str) -> Failure:
 
 
 def named(board: Board, name: str) -> BoardEntry:
-    """The board's row of a method, by id or name; raises Failure for none, or more than one.
-
-    A row that is quoted from a paper comes before a method of the same name: only teams can change names.
-    """
+    """Find a method's row by id or name; raises Failure unless there is exactly one."""
+    # A quoted row wins over a method of the same name: only teams can change names.
     rows = rows_named(board, name)
     if len(rows) == 1:
         return rows[0]

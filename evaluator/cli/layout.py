@@ -48,7 +48,7 @@ def units(scores: Iterable[str]) -> str:
 
 
 def printable(text: str) -> str:
-    """`text` without the power to move a cursor or to reorder a line: such characters are shown escaped.
+    """Escape the characters of `text` that move a terminal's cursor or reorder a line.
 
     >>> print(printable("Foo\\x1b[2J"))
     Foo\\x1b[2J
@@ -57,9 +57,7 @@ def printable(text: str) -> str:
 
 
 def aligned(rows: Sequence[Sequence[Cell]], *, align: str) -> list[str]:
-    """Lines in which every column is as wide as its widest cell.
-
-    `align` has one letter per column: `<` left, `>` right, `.` on the decimal point.
+    """Align rows into lines; `align` has a letter per column: `<` left, `>` right, `.` decimal point.
 
     >>> rows = [[Cell("a"), Cell("MiD")], [Cell("bb"), Cell("14.8")], [Cell("c"), Cell("9.25")]]
     >>> for line in aligned(rows, align="<."):

@@ -35,7 +35,6 @@ def predictions_argument(command: Command) -> Command:
 
 
 def output_option(what: str) -> Callable[[Command], Command]:
-    """-o: where to write."""
     return click.option(
         "-o",
         "--output",
@@ -46,7 +45,6 @@ def output_option(what: str) -> Callable[[Command], Command]:
 
 
 def url_option(command: Command) -> Command:
-    """--server: which leaderboard."""
     return click.option(
         "--server",
         "--url",
@@ -73,7 +71,6 @@ def unit_option(command: Command) -> Command:
 
 
 def timeout_option(command: Command) -> Command:
-    """--timeout: how long to wait for a final state."""
     return default_option(
         "--timeout",
         "timeout_s",
@@ -92,7 +89,6 @@ def slug(_context: click.Context, _parameter: click.Parameter, value: str) -> st
 
 
 def sendable(_context: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
-    """Words that can be sent."""
     if value is not None and not is_utf8(value):
         raise click.BadParameter(f"found {value!r}, expected UTF-8 text.")
     return value

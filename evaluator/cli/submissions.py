@@ -175,10 +175,8 @@ def status(
 
 
 def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> frozenset[str]:
-    """Warn of a doubtful file, and give the codes of the warnings; raises Failure for one at fault.
-
-    A split without a manifest is left to the server, which says what is the matter with it.
-    """
+    """Print the warnings of a file and return their codes; raises Failure for a faulty file."""
+    # The server explains why a split has no manifest.
     from evaluator import read_manifest, read_predictions  # noqa: PLC0415 -- loads numpy
     from evaluator.client.answers import Refused  # noqa: PLC0415 -- loads msgspec
     from evaluator.predictions.plausibility import warnings_of  # noqa: PLC0415 -- loads numpy
@@ -256,10 +254,8 @@ def conclude(
     judge: Callable[[], None],
     warned: frozenset[str] = frozenset(),
 ) -> None:
-    """Print what is known of a submission; raises Failure when it ended without scores, or a gate fails.
-
-    Warnings with one of the codes `warned` have been printed before.
-    """
+    """Print a submission; raises Failure if it ended without scores or a gate fails."""
+    # Warnings with these codes are on the screen already.
     named = (
         f"{submission.method} on {submission.split}" if submission.method else f"submission {submission.id}"
     )

@@ -1,7 +1,6 @@
-"""The token: from the environment, the keyring, or without a keyring a file that only its owner can read.
+"""The token: from the environment, the keyring, or a file that only its owner can read."""
 
-`keyring` is imported where it is needed: it costs more time than the rest of a command.
-"""
+# `keyring` is imported late: it takes longer than the rest of a command.
 
 from __future__ import annotations
 
@@ -41,7 +40,6 @@ def token_for(url: str) -> str:
 
 
 def has_token(url: str) -> bool:
-    """Whether there is a token, for commands that also work without one."""
     is_named = os.environ.get(TOKEN_VARIABLE, "").strip() or os.environ.get(TOKEN_FILE_VARIABLE)
     return bool(is_named) or kept_token(url) is not None
 
@@ -188,5 +186,5 @@ def no_keyring(words: str) -> Failure:
 
 
 def account(url: str) -> str:
-    """The name of a server in the keyring, the same however its address is spelt."""
+    """Normalise a server's address to its name in the keyring."""
     return url.rstrip("/").lower()

@@ -24,10 +24,10 @@ class Queue(msgspec.Struct, frozen=True):
 
 
 class Submission(msgspec.Struct, frozen=True, kw_only=True):
-    """A submission. `is_new` is False for the answer to a file that was sent before.
+    """A submission. `is_new` is False if the same file was submitted before.
 
-    `rank` is that of its method, if the board shows this submission for it; of a private method the one that
-    it would have. With `awaits_intervals` they follow the scores within seconds.
+    `rank` is its method's rank if the board shows this submission; a private method's is the rank it would
+    have. With `awaits_intervals`, the intervals follow within seconds.
     """
 
     id: str
@@ -94,11 +94,10 @@ class ConfidenceInterval(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
-    """One row of a board: scores by their names, None where a TTC range has no value.
+    """A row of a board: scores by name, None where a TTC range has no value.
 
-    `id` names the row, also after a change of names: a method's id, or `published:deep-scale`. `decimals` are
-    those that its values are printed with. `pseudonym` is that of an anonymous row of one's own team, which
-    others see under it; else None.
+    `id` is permanent: a method's id, or `published:deep-scale`. `decimals` are those of its values.
+    `pseudonym` is the name that others see for an anonymous row of the own team, else None.
     """
 
     method: str
@@ -122,8 +121,8 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
 class Board(msgspec.Struct, frozen=True, kw_only=True):
     """The ranked entries of a split in an edition.
 
-    `floor` are the scores of the ground truth itself. `unit` is what its intervals and ranks take as
-    independent, `n_units` how many there are.
+    `floor` are the ground truth's own scores, `unit` and `n_units` the independent units of intervals and
+    ranks.
     """
 
     split: str
@@ -247,10 +246,9 @@ class Refused(ClientError):
 
 @dataclass(kw_only=True, eq=False)
 class BadAnswer(ClientError):
-    """An answer that is no leaderboard's: not JSON, not of the documented shape, or a redirect.
+    """An answer that is not a leaderboard's: not JSON, of another shape, or a redirect."""
 
-    A redirect is not followed: a token goes only where its owner sends it.
-    """
+    # Following a redirect could send the token to another server.
 
     url: str
     content: str

@@ -1,9 +1,7 @@
-"""All tables of the paper of 2023: main results, ablations, cameras, scripts, as printed.
+"""All tables of the paper of 2023, as printed; notes name its contradictions.
 
-    table = published_tables().table("ablation-frame-gap")
-    table.value(method="pixel-mse", setting=5, column="mid")  # 41.0
-
-Values are those that the paper prints; where it contradicts itself, the notes of the table say so.
+table = published_tables().table("ablation-frame-gap")
+table.value(method="pixel-mse", setting=5, column="mid")  # 41.0
 """
 
 from __future__ import annotations
@@ -18,10 +16,7 @@ Setting = bool | int | float | str | None
 
 
 class PublishedRow(msgspec.Struct, frozen=True):
-    """One row: `values` go with the table's columns. An ablation's row is of a `method` at a `setting`.
-
-    `printed` has the values as the paper prints them, where that is not how a number is written.
-    """
+    """A row: `values` by column of a `method`, and in an ablation of a `setting`."""
 
     key: str | int | float
     values: tuple[Any, ...]
@@ -30,13 +25,11 @@ class PublishedRow(msgspec.Struct, frozen=True):
     setting: Setting = None
     is_default: bool = False
     printed_as: str | None = None
-    printed: tuple[str, ...] | None = None
+    printed: tuple[str, ...] | None = None  # the paper's spelling of `values`, where numbers differ from it
 
 
 class PublishedTable(msgspec.Struct, frozen=True):
-    """One table. `units` are by column, `section` and `caption` the paper's; `is_result` marks the tables of
-    measured numbers. An ablation varies `parameter`.
-    """
+    """A table: `units` by column, the paper's `section` and `caption`, an ablation's `parameter`."""
 
     name: str
     section: str
@@ -44,15 +37,12 @@ class PublishedTable(msgspec.Struct, frozen=True):
     columns: tuple[str, ...]
     units: dict[str, str]
     rows: tuple[PublishedRow, ...]
-    is_result: bool
+    is_result: bool  # of measured numbers
     parameter: str | None = None
     notes: tuple[str, ...] = ()
 
     def value(self, *, method: str, setting: Setting, column: str, split: str = "val") -> float | None:
-        """The number of a method at a setting; None where the paper has none.
-
-        Raises `KeyError` for a column that the table lacks.
-        """
+        """Return a method's number at a setting, None if absent; raises `KeyError` for an unknown column."""
         if column not in self.columns:
             raise KeyError(column)
         for row in self.rows:

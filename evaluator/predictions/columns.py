@@ -1,17 +1,15 @@
-"""The columnar reading of a prediction file: no Python object per key, no dictionary.
+"""Columnar reading of a prediction file, without a Python object per key.
 
-Keys of a few digits, as machines write them, are compared with the manifest's as 64-bit words, then
-overwritten with spaces, so that a JSON list of numbers remains for a fast parser. Other files are parsed into
-a dictionary. Both ways give what the strict reading (`evaluator.predictions.alignment`) gives, or None where
-it might refuse.
-
-Why the first way is exact. Let n be the number of sequences. It is taken only if (1) the text has n colons,
-(2) the bytes before each are the key of another sequence of the manifest with its quotation marks, (3) each
-key but the first is preceded by a comma and the same white space, the first by `{` and white space, and
-(4) the text with all these keys blanked, and the outer braces turned into brackets, is a JSON list of n
-numbers. By (4) there are n - 1 commas, by (3) each stands directly before a key; so every part between commas
-holds one key, at its front, and one number.
+Keys of a few digits are compared with the manifest's as 64-bit words and overwritten with spaces; the JSON
+list of numbers that remains goes to a fast parser. Other files become a dictionary. The result is that of the
+strict reading (`evaluator.predictions.alignment`), or None where that might refuse.
 """
+
+# Why reading by words is exact, for n sequences. It needs that (1) the text has n colons, (2) the bytes
+# before each are another key of the manifest in its quotation marks, (3) each key but the first follows a
+# comma and the same white space, the first `{` and white space, and (4) the text with keys blanked and the
+# outer braces as brackets is a JSON list of n numbers. By (4) there are n - 1 commas, by (3) each is directly
+# before a key; so every part between commas has one key, at its start, and one number.
 
 from __future__ import annotations
 
@@ -113,7 +111,7 @@ def _split_envelope(text: bytes) -> tuple[bytes, Document] | None:
 
 
 class KeyWords(NamedTuple):
-    """The keys of a manifest as they stand in a file, `"123":`, each in the last bytes of its word; all (n,).
+    """The keys of a manifest as bytes of a file, `"123":`, at the end of 64-bit words; all (n,).
 
     `masks` select these bytes, `lengths` count them; `row_of_number` is the row of each anno_id.
     """
@@ -126,7 +124,7 @@ class KeyWords(NamedTuple):
 
 @lru_cache(maxsize=4)
 def key_words(manifest: Manifest) -> KeyWords | None:
-    """The keys as words, made once for a manifest, or None when one has more than five digits."""
+    """Make the words of a manifest's keys; None if a key has more than five digits."""
     if int(manifest.anno_id.max()) >= 10**_MAX_DIGITS:
         return None
     texts = np.char.add(np.char.add(b'"', manifest.anno_id.astype(f"S{_MAX_DIGITS}")), b'":')
@@ -138,7 +136,6 @@ def key_words(manifest: Manifest) -> KeyWords | None:
 
 
 def _by_words(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
-    """Read keys of up to five digits as words; the module's docstring says why this is exact."""
     keys, n = key_words(manifest), manifest.n_sequences
     if keys is None or not _FIRST_DIGIT.match(text):
         return None

@@ -1,7 +1,6 @@
-"""The strict reading of a prediction file: every object as its list of members, every fault in words.
+"""Strict reading of a prediction file: every member in order, every fault in words.
 
-This path decides what a file means. The columnar path (`evaluator.predictions.columns`) is only a faster way
-to the same result for files without surprises; it hands over whatever is unusual.
+It decides what a file means; `evaluator.predictions.columns` is a faster way to the same result.
 """
 
 from __future__ import annotations
@@ -64,10 +63,10 @@ class Document:
 
 
 def parse(data: bytes, *, max_members: int | None = None) -> object:
-    """The JSON value in `data`, objects as `Members`; raises `Rejected` unless it is UTF-8, shallow and JSON.
+    """Parse JSON with objects as `Members`; raises `Rejected` unless it is shallow UTF-8 JSON.
 
-    Text with more than `max_members` members and items is refused before it takes memory. A byte order mark
-    and Python's `NaN`, `Infinity` and `-Infinity` are accepted; numbers beyond float64 are ±Infinity.
+    Refuses more than `max_members` members and items. Accepts a byte order mark, `NaN`, `Infinity` and
+    `-Infinity`; numbers beyond float64 become ±Infinity.
     """
     body = data.removeprefix(BYTE_ORDER_MARK)
     try:
@@ -151,7 +150,7 @@ def read_document(value: object) -> Document:
 
 
 def kind_of(value: object) -> str:
-    """The kind of a JSON value for messages, with the value if it is short.
+    """Name the kind of a JSON value, with the value if it is short.
 
     >>> kind_of("5.3"), kind_of(None), kind_of([1])
     ('the string "5.3"', 'null', 'a list')

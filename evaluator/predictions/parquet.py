@@ -1,7 +1,4 @@
-"""Predictions in a Parquet table, as the JSON that the leaderboard takes in its place.
-
-The leaderboard reads no Parquet (ADR 8). Needs pyarrow, `pip install '.[parquet]'`.
-"""
+"""Predictions in a Parquet table, converted to JSON on the participant's machine (ADR 8). Needs pyarrow."""
 
 from __future__ import annotations
 
@@ -16,10 +13,10 @@ _MAGIC: Final = b"PAR1"
 
 
 def as_sent(data: bytes) -> bytes:
-    """A prediction file as the leaderboard takes it: a Parquet table as JSON, any other file as it is.
+    """Convert a Parquet table to a JSON prediction file, always the same bytes; other files stay.
 
-    The same table gives the same bytes. Raises `Rejected` for a table that is damaged or has other columns
-    than keys and numbers, `ModuleNotFoundError` where pyarrow is not installed.
+    Raises `Rejected` for a damaged table and columns other than keys and numbers, `ModuleNotFoundError`
+    without pyarrow.
     """
     if not data.startswith(_MAGIC):
         return data

@@ -1,8 +1,6 @@
-"""Warnings about files that are well-formed and probably not meant: another unit, sign or order.
+"""Warnings about well-formed files that probably have another unit, sign or order."""
 
-A warning rejects nothing. Values are compared by the rank of -1/τ, which orders them by scale ratio, so that
-no outlier decides.
-"""
+# Values are compared by the rank of -1/τ, the order of scale ratios: outliers have no weight.
 
 from __future__ import annotations
 
@@ -99,7 +97,7 @@ def _order_warnings(manifest: Manifest, ttc_s: Floats) -> list[FileWarning]:
 
 
 def warnings_with_truth(predictions: Predictions, truth: GroundTruth) -> list[FileWarning]:
-    """What the values and the comparison with ground truth tell. Not for hidden ones: it tells about them."""
+    """Compare values with the ground truth. The warnings reveal it, so hidden truths must not be used."""
     return [*unit_warnings(predictions.ttc_s), *_truth_warnings(predictions, truth)]
 
 
@@ -131,11 +129,10 @@ _CAUSE: Final = (
 
 
 def roughness(manifest: Manifest, ttc_s: Floats) -> float | None:
-    """How far neighbouring windows of one object differ, over how far successive windows of two objects do.
+    """Compare neighbouring windows of one object with successive windows of two, by mean rank differences.
 
-    Both are means of absolute differences of ranks: 1 where the values have nothing to do with their keys,
-    and well below where they are smooth in time. None where there are too few pairs, or the values do not
-    differ.
+    1 means that values are unrelated to their keys; smooth values give well below 1. None for few pairs or
+    equal values.
     """
     same, other = _pairs(manifest)
     if min(len(same), len(other)) < MIN_PAIRS:

@@ -1,8 +1,7 @@
-"""The child process in which untrusted bytes are parsed: `python -m evaluator.predictions.reader`.
+"""The child process that parses untrusted bytes: `python -m evaluator.predictions.reader`.
 
-It gives up its rights (`evaluator.limits`), writes `READY` to its standard output, reads a prediction file
-from its standard input, and writes one line of JSON, followed, if the file is good, by the aligned values in
-seconds as little-endian float64.
+It gives up its rights (`evaluator.limits`), writes `READY`, reads a prediction file from standard input, and
+writes a line of JSON and, for a good file, the aligned seconds as little-endian float64.
 """
 
 import json

@@ -1,15 +1,12 @@
-"""The process that forks a child for each prediction file: `python -m evaluator.predictions.reader_server`.
-
-A file of 28,600 sequences takes 0.44 s in a new Python, which loads numpy first, and 0.02 s in a forked one.
-The server has no credentials and reads no untrusted byte itself: it forks a child for each file, which gives
-up its rights, reads, answers and ends, as `evaluator.predictions.reader` does.
+"""The process that forks a reader for each prediction file: `python -m evaluator.predictions.reader_server`.
 
 Standard input is a socket of packets. A request is JSON (`manifest`, `memory_bytes`, `cpu_s`) with three
-descriptors: the file, and the pipes for the child's output and errors. The first reply is
-`{"started": pid}` with a descriptor of the process, or `{"failed": reason}` if there is no child; the second
-is `{"returncode": n}`, negative for a signal. One file at a time. The server ends with the process that has
-the other end of the socket.
+descriptors: the file, and the pipes for output and errors. The replies are `{"started": pid}` with a
+descriptor of the child, or `{"failed": reason}`; then `{"returncode": n}`, negative for a signal.
 """
+
+# A fork reads 28,600 sequences in 0.02 s, a new Python, which loads numpy, in 0.44 s. The server itself has
+# no credentials and reads no untrusted byte; it handles one file at a time.
 
 import gc
 import json

@@ -1,8 +1,4 @@
-"""Revisions of a ground truth: the changes between two, and reading a file for one with the other.
-
-Sequences are told apart by their natural keys; an anno_id is a number of one manifest and means nothing in
-another.
-"""
+"""Revisions of a ground truth: their differences by natural key, and a file for one read with another."""
 
 from __future__ import annotations
 
@@ -21,8 +17,7 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Counts of sequences: only in the new one, only in the old one, in both with another time to contact,
-    in both with another anno_id."""
+    """Counts of sequences: added, removed, with another time to contact, with another anno_id."""
 
     n_added: int
     n_removed: int
@@ -56,11 +51,7 @@ def rows_in(old: Manifest, new: Manifest) -> Rows:
 
 
 def realigned(predictions: Predictions, *, manifest: Manifest) -> Predictions:
-    """The predictions in the order of another manifest, sequence by sequence.
-
-    Values for sequences that `manifest` does not have are left aside. Raises `Rejected` with `missing-keys`
-    where it has sequences that the file's own manifest did not have.
-    """
+    """Reorder predictions for another manifest; raises `Rejected` (`missing-keys`) for new sequences."""
     own = predictions.manifest
     rows = rows_in(own, manifest)
     if len(missing := np.flatnonzero(rows < 0)):

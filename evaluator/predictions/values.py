@@ -1,7 +1,6 @@
-"""What a value of a prediction file must be: the one list of rules.
+"""The rules for a value of a prediction file, one list for reading, writing, conversion and scoring.
 
-To add a rule, add it to `RULES` and its code to `PROBLEM_CODES`. Both ways of reading, writing, conversion,
-scoring and the leaderboard's check of what a reader says all ask here.
+To add a rule, add it to `RULES` and its code to `PROBLEM_CODES`.
 """
 
 from __future__ import annotations
@@ -19,10 +18,7 @@ from evaluator.predictions.documents import Unit, kind_of
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A rule of values: `holds` is asked for one number and elementwise for an array, NaN included.
-
-    `shown` and `expected` are the words of its problem; {} stands for the value.
-    """
+    """A rule: `holds` for a number or elementwise for an array; {} in its texts is the value."""
 
     code: str
     holds: Callable[[Any], Any]

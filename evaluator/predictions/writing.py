@@ -32,13 +32,12 @@ def write_predictions(
     frame_gap: int | None = None,
     meta: Mapping[str, object] | None = None,
 ) -> bytes:
-    """The bytes of a valid prediction file, also written to `path`, or to an open file, if one is given.
+    """Write a valid prediction file; returns its bytes, and writes them to `path` or an open file if given.
 
-    Give either `ttc_s` (seconds) or `scale_ratio` with `fps_hz` or `frame_gap`, shape (n,); and either
-    `manifest`, whose order the values have, or their `keys`. Every float64 reads back exactly. Seconds
-    without `meta` are written in the toolkit's flat form, anything else in the envelope.
-
-    Raises `ValueError` for arguments that do not fit together, `Rejected` for values that no file may hold.
+    Give `ttc_s` (seconds), or `scale_ratio` with `fps_hz` or `frame_gap`, (n,); and `manifest`, whose order
+    the values have, or their `keys`. Every float64 reads back exactly. Seconds without `meta` use the flat
+    form, others the envelope. Raises `ValueError` for a wrong combination of arguments, `Rejected` for values
+    that no file may hold.
     """
     values = _values(ttc_s, scale_ratio, manifest)
     names = _names(manifest, keys, n_values=len(values))

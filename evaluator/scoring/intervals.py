@@ -29,10 +29,10 @@ def confidence_intervals(
     protocol: str | Protocol = DEFAULT_PROTOCOL,
     unit: str | None = None,
 ) -> dict[str, tuple[float, float] | None]:
-    """The 95 % interval of each number, as the board shows it; None where there is none.
+    """Compute the 95 % interval of each score as the board shows it; None where there is none.
 
-    `unit` is recording, day or given; None: by the rule, `truth.manifest.units`. Raises `ValueError` for a
-    unit that the recordings do not have.
+    `unit` is recording, day or given; None takes `truth.manifest.units`. Raises `ValueError` for a unit that
+    the recordings lack.
     """
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
     units = truth.manifest.units_by(unit)

@@ -1,7 +1,6 @@
-"""Figures for a paper: error by true time to contact, predicted against true, distribution. Needs `[plots]`.
+"""Figures for a paper: error by true time, predicted against true, distribution. Needs `[plots]`."""
 
-Matplotlib draws on a canvas of its own: no window opens, and no other figure of the program is touched.
-"""
+# Matplotlib draws on a canvas of its own: no window opens, and other figures of the program stay.
 
 from __future__ import annotations
 
@@ -37,10 +36,7 @@ SETTINGS: Final[dict[str, Any]] = {
 
 
 def draw(kind: str, scored: Mapping[str, Details], *, path: str | Path | None = None) -> Figure:
-    """Draw `kind`, one of `KINDS`, of what was scored, by the names that the legend shows.
-
-    Raises `ValueError` for another kind and another ending of `path`.
-    """
+    """Draw `kind`, one of `KINDS`, of details by legend name; raises `ValueError` for others."""
     if kind not in KINDS:
         raise ValueError(f"Unknown kind {kind!r}; expected one of {', '.join(KINDS)}.")
     if path is not None and Path(path).suffix.lower() not in SUFFIXES:

@@ -56,11 +56,10 @@ class Origin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Export:
-    """A board as writers take it; each reads once what it needs.
+    """A board for the export formats; each reads the rows once.
 
-    `rows` are those of a table, without what was withdrawn, `records` all rows by the names of `columns`:
-    numbers as they are published, None where nothing is known. `references` are BibTeX entries of the papers
-    that rows name.
+    `rows` are those of a table, without withdrawn ones; `records` all rows by `columns`, with published
+    numbers or None; `references` the BibTeX entries of papers.
     """
 
     origin: Origin
@@ -106,7 +105,7 @@ def marked(name: str, mark: str) -> str:
 
 
 def short_authors(authors: str) -> str:
-    """Authors as a table has room for them.
+    """Shorten authors for a table.
 
     >>> short_authors("Yuheng Shi, Zehao Huang, Yan Yan")
     'Shi et al.'
@@ -121,7 +120,7 @@ def short_authors(authors: str) -> str:
 
 
 def rank_text(rank: int | None, *, low: int | None = None, high: int | None = None) -> str:
-    """A rank, and behind it where the row may stand.
+    """Format a rank, with its range.
 
     >>> rank_text(2), rank_text(2, low=1, high=3), rank_text(1, low=1, high=1), rank_text(None)
     ('2', '2 (1–3)', '1 (1)', '–')
@@ -192,7 +191,7 @@ def _latex_cell(cell: Cell) -> str:
 
 
 def _latex_unit(unit: str) -> str:
-    r"""A unit as LaTeX has it, a power of ten as mathematics.
+    r"""Format a unit for LaTeX.
 
     >>> print(_latex_unit("×10⁻⁴"), _latex_unit("%"))
     $\times 10^{-4}$ \%

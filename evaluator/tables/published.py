@@ -154,7 +154,7 @@ def _values(row: PublishedRow) -> Iterator[str]:
 
 
 def _value_text(value: Any) -> str:
-    """A value as it is printed; results have one decimal.
+    """Format a value; results have one decimal.
 
     >>> [_value_text(value) for value in (41.0, True, None, [-80, 80], [40, 60, 80], {"v_ego_minus": 20})]
     ['41.0', 'yes', '–', '−80 to 80', '40, 60, 80', 'ego − 20']

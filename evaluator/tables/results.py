@@ -16,10 +16,7 @@ Ends = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class ResultRow:
-    """The scores of one file, or of one group of its sequences, by their names; None has no value.
-
-    `units` says in words what the intervals take as independent, as "42 days".
-    """
+    """The scores of a file or group by name, None without value; `units` of the intervals, as "42 days"."""
 
     file: str
     group: str | None

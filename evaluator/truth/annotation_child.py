@@ -1,9 +1,8 @@
-"""The child process in which annotation files are read: `python -m evaluator.truth.annotation_child`.
+"""The child process that reads annotation files: `python -m evaluator.truth.annotation_child`.
 
-It writes `READY` to its standard output. Its standard input then gives it files, each as a line of JSON
-(`name`, `n_bytes`) and its content; it answers each with an empty line. At the end of its input it writes the
-sequences of all of them as one line of JSON, or the problems of the first file at fault. Like the child that
-reads prediction files it gives up everything else first.
+It gives up its rights and writes `READY`. Each file on standard input, a line of JSON (`name`, `n_bytes`) and
+its content, gets an empty line. At the end it writes all sequences, or the problems of the first faulty file,
+as a line of JSON.
 """
 
 import json

@@ -44,10 +44,9 @@ _NUMBER: Final = re.compile(
 
 @dataclass(slots=True)
 class Table:
-    """Columns as they were read, one item per sequence, and the place of each row for messages.
+    """Columns as read, one item per sequence, and the source row of each for messages.
 
-    Those of `OBJECT_COLUMNS` and `unit` are empty where the source does not have them; None in the former is
-    a missing value.
+    `OBJECT_COLUMNS` and `unit` are empty if the source lacks them; None in the former is a missing value.
     """
 
     anno_id: list[int] = field(default_factory=list)
@@ -64,18 +63,18 @@ class Table:
 
     @property
     def manifest_columns(self) -> tuple[str, ...]:
-        """The columns of its manifest: with `unit` where it has that."""
+        """The columns of its manifest, with `unit` if present."""
         return (*MANIFEST_COLUMNS, UNIT) if self.unit else MANIFEST_COLUMNS
 
     def where(self, row: int) -> str:
-        """`line 3` of a CSV, or whatever the source calls the row."""
+        """Return `line 3` of a CSV, or the source's name of the row."""
         if not self.locations:
             return f"row {row + 1}"
         location = self.locations[row]
         return location if isinstance(location, str) else f"line {location}"
 
     def text(self, columns: tuple[str, ...], *, order: list[int] | None = None) -> str:
-        """The table as CSV text in the given row order, times to contact in their shortest exact spelling."""
+        """Return the table as CSV text in this row order, times to contact in shortest exact form."""
         lines = self._lines(columns)
         return _text(columns, lines if order is None else [lines[row] for row in order])
 
@@ -93,10 +92,9 @@ class Table:
         return list(map(",".join, zip(*(values[name] for name in columns), strict=True)))
 
     def digests(self) -> tuple[str, str]:
-        """`sha256:…` of the texts of the manifest and of the whole table, rows in ascending anno_id.
+        """Compute `sha256:…` of the manifest's text and of the whole table's, in ascending anno_id.
 
-        The latter is empty where there are no times to contact. A table without units has the digests that
-        it had before there were any.
+        The second is empty without times to contact. A missing column `unit` does not change a digest.
         """
         columns = self.manifest_columns
         lines = self._lines(columns)
@@ -118,10 +116,8 @@ def _digest(columns: tuple[str, ...], lines: list[str]) -> str:
 
 @lru_cache(maxsize=4096)  # the same few names stand in thousands of rows
 def name_fault(text: str) -> str | None:
-    """Why `text` cannot be a bag_stamp, cam_id or track_id; None when it can.
-
-    These words are joined by "/" in natural keys and by "," in tables, so they must be free of both.
-    """
+    """Explain why `text` cannot be a bag_stamp, cam_id or track_id, else None."""
+    # Natural keys join these words by "/", tables by ",".
     if not text:
         return "it is empty"
     if len(text) > _MAX_FIELD:
@@ -144,11 +140,9 @@ def read_text(source: Source) -> str:
 
 
 def read_csv(source: Source, *, with_ttc: bool) -> Table:
-    """Read `COLUMNS` from a CSV file with a header; more columns are ignored, their order is free.
+    """Read `COLUMNS` and `unit`, with `with_ttc` also `OBJECT_COLUMNS`, from a CSV file with a header.
 
-    Also `unit` where it is there, and with `with_ttc` those of `OBJECT_COLUMNS`.
-
-    Raises `Rejected` for an unreadable file, missing columns and malformed fields, by line.
+    Raises `Rejected`, by line, for an unreadable file, missing columns and malformed fields.
     """
     text = read_text(source)
     columns = COLUMNS if with_ttc else MANIFEST_COLUMNS

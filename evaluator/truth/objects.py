@@ -1,8 +1,7 @@
-"""What annotations state about the object of a sequence in the target frame, except its time to contact.
+"""Annotations of the object in the target frame, for offline analyses; scores and digests ignore them.
 
-`occ_ratio` (how much of it is occluded, 0 to 1), `same_lane` (whether it drives in the lane of the camera's
-car) and `box2d` (x1, y1, x2, y2 as parts of the image's width and height). No score and no digest depends on
-them; offline analyses group by them.
+`occ_ratio` is the occluded part (0 to 1), `same_lane` whether the object is in the lane of the camera's car,
+`box2d` x1, y1, x2, y2 as parts of the image's width and height.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ _FARTHEST: Final = 2.0  # a box may be partly outside the image; beyond this it 
 
 @dataclass(frozen=True, eq=False)
 class Objects:
-    """The columns as float64 arrays, NaN where nothing is stated; None where the source has no such column.
+    """Annotations as float64 arrays, NaN where missing; None without the column.
 
     `occ_ratio` and `same_lane` (1 or 0) are (n,), `box2d` is (n, 4).
     """
@@ -83,7 +82,7 @@ def _floats(column: Sequence[Any]) -> Floats | None:
 
 
 def occ_ratio_of(text: str) -> float | None:
-    """The occluded part.
+    """Parse the occluded part.
 
     >>> occ_ratio_of("0.25"), occ_ratio_of("")
     (0.25, None)
@@ -101,7 +100,7 @@ def occ_ratio_of(text: str) -> float | None:
 
 
 def same_lane_of(text: str) -> bool | None:
-    """Whether the object drives in the same lane.
+    """Parse whether the object is in the same lane.
 
     >>> same_lane_of("1"), same_lane_of("False"), same_lane_of("")
     (True, False, None)
@@ -114,7 +113,7 @@ def same_lane_of(text: str) -> bool | None:
 
 
 def box2d_of(text: str) -> list[float] | None:
-    """Four numbers with spaces between them.
+    """Parse four numbers with spaces between them.
 
     >>> box2d_of("0.25 0.25 0.5 0.75"), box2d_of("")
     ([0.25, 0.25, 0.5, 0.75], None)
@@ -140,7 +139,7 @@ FIELDS: Final[dict[str, Callable[[str], Any]]] = {
 
 
 def text_of(value: float | bool | Sequence[float] | None) -> str:
-    """The field of a value, as the functions above read it.
+    """Format a value as the functions above parse it.
 
     >>> text_of(0.25), text_of(True), text_of([0.25, 0.25, 0.5, 0.75]), text_of(None)
     ('0.25', '1', '0.25 0.25 0.5 0.75', '')

@@ -1,10 +1,8 @@
-"""Reading a pickle that names nothing but data.
+"""Reading a pickle that names only data."""
 
-What a pickle asks for by name is answered here: with Python's containers, and with classes of this module in
-place of attribute-dicts and of numpy's types. Nothing is imported, and nothing that outlives it is changed:
-each class here has a `__setstate__`, so that the unpickler sets no attributes. What a pickle costs is **not**
-bounded here: `annotation_child` reads files within the limits of its process.
-"""
+# Every name in a pickle is answered by Python's containers or a class of this module, so nothing is imported.
+# Each class has a `__setstate__`, so that the unpickler changes no lasting attribute. Memory and time are
+# **not** limited here, but in the process of `annotation_child`.
 
 from __future__ import annotations
 
@@ -26,11 +24,9 @@ _NUMERIC: Final = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|c8|c16)")
 
 
 def load_plain(data: bytes, *, where: str) -> object:
-    """The value that the pickle in `data` describes; raises `Rejected`, at `where`, for anything beyond plain
-    data, and MemoryError.
+    """Load a pickle of plain data; raises `Rejected` at `where` for anything else, and MemoryError.
 
-    Attribute-dicts come back as `Attributes`, numpy scalars as Python numbers, ordered and default dicts as
-    dicts, and arrays as `FewNumbers`.
+    Attribute-dicts become `Attributes`, numpy scalars Python numbers, other dicts dicts, arrays `FewNumbers`.
     """
     try:
         # A buffered reader can be peeked into, so that the unpickler does not ask for each few bytes.
