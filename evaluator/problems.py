@@ -159,14 +159,11 @@ def _restored(problems: tuple[Problem, ...], n_problems: int) -> Rejected:
 
 @dataclass(slots=True)
 class _Line:
-    """A problem with the further places where it was found: their number, and the first of them."""
-
     problem: Problem
     n_more: int = 0
     more: list[str] = field(default_factory=list)
 
     def add(self, where: str) -> None:
-        """Note a further place; a place may have several faults of a kind, one after the other."""
         if where == (self.more[-1] if self.more else self.problem.where):
             return
         self.n_more += 1
@@ -183,7 +180,7 @@ class _Line:
 
 
 class Findings:
-    """Collects problems while a file is read, so that one answer names them all, equal ones in one line."""
+    """A collector of problems while a file is read: one answer names them all."""
 
     def __init__(self) -> None:
         self._lines: list[_Line] = []
@@ -208,12 +205,11 @@ class Findings:
             self._n_unlisted[code] += 1
 
     def group(self, code: str, message: str, where: str = "", *, n_faults: int) -> None:
-        """Note many faults of one kind as a single problem, whose message gives count and examples."""
+        """Note many faults of one kind as one problem with count and examples."""
         self._lines.append(_Line(Problem(code, message, where)))
         self._n_grouped += n_faults
 
     def raise_if_any(self) -> None:
-        """Raise `Rejected` when anything was noted."""
         if not self._lines:
             return
         rest = [
@@ -236,7 +232,7 @@ def n_problems_in_words(n_problems: int, *, n_lines: int) -> str:
 
 
 def reject(code: str, message: str, where: str = "") -> Rejected:
-    """The rejection for a single problem, to be raised."""
+    """Make the rejection for one problem."""
     return Rejected([Problem(code, message, where)])
 
 

@@ -44,7 +44,7 @@ class NotVerified(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verified:
-    """A receipt with a checked signature. `method` is the name that the method had when it was signed."""
+    """A receipt with a checked signature; `method` is the name at signing."""
 
     site: str
     key_id: str
@@ -63,7 +63,6 @@ class Verified:
 
 
 def decimal(value: float | None, *, decimals: int) -> str | None:
-    """A score as a receipt has it."""
     return None if value is None else f"{value:.{decimals}f}"
 
 
@@ -71,26 +70,26 @@ def decimal(value: float | None, *, decimals: int) -> str | None:
 
 
 def public_key(private_key: bytes) -> bytes:
-    """The public half of an Ed25519 seed."""
+    """Return the public key of an Ed25519 seed."""
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey  # noqa: PLC0415 - slow to import
 
     return Ed25519PrivateKey.from_private_bytes(private_key).public_key().public_bytes_raw()
 
 
 def key_id(public_key: bytes) -> str:
-    """The name of an Ed25519 public key of 32 bytes: its RFC 7638 thumbprint."""
+    """Return the RFC 7638 thumbprint of an Ed25519 public key of 32 bytes."""
     members = {"crv": "Ed25519", "kty": "OKP", "x": encode(public_key)}
     return encode(hashlib.sha256(json.dumps(members, separators=(",", ":")).encode()).digest())
 
 
 def key_set(public_keys: list[bytes]) -> Document:
-    """The JSON Web Key Set of these keys."""
+    """Make the JSON Web Key Set of these keys."""
     shared = {"kty": "OKP", "crv": "Ed25519", "use": "sig", "alg": "EdDSA"}
     return {"keys": [shared | {"kid": key_id(key), "x": encode(key)} for key in public_keys]}
 
 
 def read_keys(data: bytes) -> dict[str, Ed25519PublicKey]:
-    """The Ed25519 keys of a key set, by name. Raises `NotVerified` (`receipt-keys`)."""
+    """Read the Ed25519 keys of a key set, by name. Raises `NotVerified` (`receipt-keys`)."""
     from jwt import PyJWKSet, PyJWTError  # noqa: PLC0415 - slow to import
 
     try:
@@ -125,7 +124,7 @@ def decode(text: str) -> bytes:
 
 
 def sign(document: Mapping[str, Any], *, private_key: bytes) -> str:
-    """The receipt of these fields. `private_key` is the Ed25519 seed of 32 bytes."""
+    """Sign a receipt of these fields with an Ed25519 seed of 32 bytes."""
     import jwt  # noqa: PLC0415 - slow to import
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey  # noqa: PLC0415 - likewise
 
@@ -135,7 +134,7 @@ def sign(document: Mapping[str, Any], *, private_key: bytes) -> str:
 
 
 def verify(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
-    """Check that one of these keys (see `read_keys`) signed the receipt; read it. Raises `NotVerified`."""
+    """Check a receipt's signature by these keys (see `read_keys`) and read it. Raises `NotVerified`."""
     if len(receipt) > MAX_BYTES:
         raise _malformed(f"it has {len(receipt):,} bytes; expected at most {MAX_BYTES:,}")
     try:
@@ -152,7 +151,6 @@ def verify(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
 
 
 def _read(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> tuple[str, Document]:
-    """The name of the key, and what it signed. Raises `NotVerified`, and what reading raises."""
     import jwt  # noqa: PLC0415 - slow to import
 
     text = receipt.decode().strip()
@@ -187,7 +185,6 @@ def _malformed(what: str) -> NotVerified:
 
 
 def _verified(document: Document, named: str) -> Verified:
-    """A signed document, in the order of its protocol; of one that is newer, in the order of names."""
     rules = PROTOCOLS.get(document["protocol"])
     names = rules.score_names if rules else sorted(document["scores"])
     texts = {name: document["scores"][name] for name in names}

@@ -50,13 +50,11 @@ _KILL: Final = 0x80000000
 
 
 class _Program(ctypes.Structure):
-    """`struct sock_fprog`."""
-
     _fields_ = (("n_instructions", ctypes.c_ushort), ("instructions", ctypes.c_char_p))
 
 
 def why_unavailable() -> str | None:
-    """Why this system filters no calls; None if it does."""
+    """Explain why this system cannot filter calls, else None."""
     if sys.platform != "linux":
         return f"{sys.platform} has no seccomp"
     machine = os.uname().machine
@@ -77,12 +75,11 @@ def allow_only_reading() -> None:
 
 
 def program_for(machine: str) -> bytes:
-    """The filter as the kernel reads it, instructions of 8 bytes. Raises `KeyError` for unknown machines."""
+    """Build the filter, instructions of 8 bytes. Raises `KeyError` for unknown machines."""
     return b"".join(struct.pack("=HBBI", *one) for one in _instructions(machine))
 
 
 def _instructions(machine: str) -> Iterator[tuple[int, int, int, int]]:
-    """Operation, instructions to skip where the words are equal and where they are not, operand."""
     column, architecture = _ARCHITECTURES[machine]
     yield _LOAD, 0, 0, 4
     yield _JUMP_IF_EQUAL, 1, 0, architecture
@@ -95,7 +92,6 @@ def _instructions(machine: str) -> Iterator[tuple[int, int, int, int]]:
 
 
 def _prctl(option: int, argument: int, pointer: object = 0) -> int:
-    """The fault's number, or 0."""
     prctl = ctypes.CDLL(None, use_errno=True).prctl
     prctl.argtypes = (ctypes.c_int, ctypes.c_ulong, ctypes.c_void_p, ctypes.c_ulong, ctypes.c_ulong)
     return ctypes.get_errno() if prctl(option, argument, pointer, 0, 0) else 0

@@ -29,7 +29,6 @@ _DATE: Final = re.compile(r"((?:19|20)\d\d)([-_]?)(\d\d)\2(\d\d)(?!\d)", re.ASCI
 
 
 def noun_of(kind: str) -> str:
-    """The noun for one unit of this kind."""
     return _NOUNS.get(kind, kind)
 
 
@@ -62,7 +61,7 @@ def day_of(recording: str) -> date | None:
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """The units of some recordings: their `names`, and for every recording the `index` of its unit."""
+    """The units of recordings: their `names`, and the unit's `index` of every recording."""
 
     kind: str
     names: tuple[str, ...]
@@ -100,7 +99,6 @@ def units_of(recordings: Sequence[str], *, given: Mapping[str, str], kind: str |
 
 
 def _days(recordings: Sequence[str]) -> list[str] | None:
-    """The day of every recording; None unless each has one."""
     days = [day.isoformat() for name in recordings if (day := day_of(name))]
     return days if len(days) == len(recordings) else None
 

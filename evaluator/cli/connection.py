@@ -64,7 +64,6 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
 
 
 def _splits_instead(client: Client, error: Refused) -> list[str]:
-    """The splits of the leaderboard, where the one that the command names is not among them."""
     from evaluator.client.answers import ClientError  # noqa: PLC0415 -- loads msgspec
 
     context = click.get_current_context(silent=True)
@@ -79,7 +78,7 @@ def _splits_instead(client: Client, error: Refused) -> list[str]:
 
 
 def version() -> str:
-    """The installed version; 0 in a checkout that was never installed."""
+    """Return the installed version, 0 in a checkout."""
     import importlib.metadata  # noqa: PLC0415 -- costs more time than the rest of --help
 
     try:
@@ -123,7 +122,6 @@ def _sentence(text: str) -> str:
 
 
 def _refused(error: Refused, *, url: str, hint: str) -> Failure:
-    """The server's own words where it gave any; else what its status means."""
     words = _sentence(error.detail) if error.detail else _words_for(error)
     return Failure(
         words,
@@ -136,7 +134,6 @@ def _refused(error: Refused, *, url: str, hint: str) -> Failure:
 
 
 def exit_code_of(error: Refused) -> Exit:
-    """Whose turn it is after a refusal."""
     if error.status in {400, 422}:
         about_options = error.problems and all(p.where in OPTIONS for p in error.problems)
         return Exit.USAGE if about_options else Exit.REJECTED

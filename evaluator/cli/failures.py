@@ -43,7 +43,7 @@ class Failure(Exception):
         }
 
     def show(self) -> None:
-        """Words for a person on standard error; with --json the document on standard output as well."""
+        """Print the message on standard error, with --json also the document on standard output."""
         click.echo(f"Error: {printable(self.message)}", err=True)
         for line in numbered(self.problems):
             click.echo(line, err=True)
@@ -54,7 +54,6 @@ class Failure(Exception):
 
 
 def rejected(name: str, fault: Rejected, *, hint: str = "") -> Failure:
-    """The failure for a file that the library found at fault."""
     return Failure(
         f"{name} is rejected: {n_problems_in_words(fault.n_problems, n_lines=len(fault.problems))}",
         exit_code=Exit.REJECTED,
@@ -66,11 +65,10 @@ def rejected(name: str, fault: Rejected, *, hint: str = "") -> Failure:
 
 
 def numbered(problems: Sequence[Problem]) -> Iterator[str]:
-    """The problems as numbered lines."""
     for number, problem in enumerate(problems, start=1):
         yield f"{number:>3}. {printable(str(problem))}"
 
 
 def echo_json(document: object) -> None:
-    """One JSON document on standard output, floats at full precision."""
+    """Print one JSON document, floats at full precision."""
     click.echo(json.dumps(document, ensure_ascii=False, indent=2))

@@ -39,8 +39,6 @@ Scores = Mapping[str, float | None]
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """One comparison of a score with a number."""
-
     name: str
     operator: str
     number: float
@@ -101,7 +99,6 @@ def _conditions(
 
 
 def judge(conditions: Sequence[Condition], scores: Scores | None, *, decimals: int = 2) -> None:
-    """Raise Failure if one of the conditions holds or has no value."""
     known: Scores = scores or {}
     missing = [condition for condition in conditions if condition.holds(known) is None]
     holding = [condition for condition in conditions if condition.holds(known)]
@@ -162,14 +159,14 @@ def named(board: Board, name: str) -> BoardEntry:
 
 
 def rows_named(board: Board, name: str) -> list[BoardEntry]:
-    """The rows with this id; else the quoted rows of this name; else all rows of this name."""
+    """Return the rows with this id, else the quoted rows, else all rows of this name."""
     by_id = [entry for entry in board.entries if name in {entry.id, entry.method_id}]
     by_name = [entry for entry in board.entries if name == entry.method]
     return by_id or [entry for entry in by_name if entry.kind == "published"] or by_name
 
 
 def rival(client: Client, *, split: str, method: str, own: str) -> BoardEntry | None:
-    """The other method's row, None for the file's `own` method before it has one; raises Failure."""
+    """Return the other method's row, None for `own` before it has one; raises Failure."""
     board = client.board(split)
     if method == own and not rows_named(board, method):
         words = f"{printable(method)} is not on the board of {split} yet; nothing to compare with."
@@ -182,7 +179,6 @@ def rival(client: Client, *, split: str, method: str, own: str) -> BoardEntry | 
 
 
 def judge_against(entry: BoardEntry, *, mid: float | None, decimals: int = 2) -> None:
-    """Raise Failure if MiD is worse than the other method's."""
     other = entry.scores[PRIMARY]
     if mid is None or other is None:
         raise undecided("there is no value for mid")

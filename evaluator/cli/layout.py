@@ -17,8 +17,6 @@ GAP = "  "
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """The text of one cell and its emphasis on a terminal."""
-
     text: str
     is_bold: bool = False
     is_underlined: bool = False
@@ -74,7 +72,7 @@ def aligned(rows: Sequence[Sequence[Cell]], *, align: str) -> list[str]:
 
 
 def width_of(text: str) -> int:
-    """The cells of a terminal that `text` fills: two for a wide (East Asian) character, none for a mark."""
+    """Count the terminal cells of `text`: two for a wide (East Asian) character, none for a mark."""
     return sum(
         0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text
     )
@@ -110,7 +108,6 @@ def result_in_words(
     decimals: int = 2,
     intervals: Mapping[str, tuple[float, float] | None] | None = None,
 ) -> Iterator[str]:
-    """One result as lines: the table, its units, and what was counted and truncated."""
     yield from score_table(scores, counts=counts, decimals=decimals, intervals=intervals)
     yield ""
     yield units(scores)
@@ -127,7 +124,7 @@ def score_table(
     decimals: int = 2,
     intervals: Mapping[str, tuple[float, float] | None] | None = None,
 ) -> list[str]:
-    """One result, below each value the ends of its interval and the number of sequences behind it."""
+    """Tabulate one result, with the ends of each interval and the number of sequences below each value."""
     from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     behind = [counts.get(split_name(name)[1]) for name in scores]

@@ -24,12 +24,10 @@ default_option: Final = partial(click.option, show_default=True)
 
 
 def json_option(command: Command) -> Command:
-    """--json: one JSON document on standard output, whatever happens."""
     return click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")(command)
 
 
 def predictions_argument(command: Command) -> Command:
-    """PREDICTIONS: a file, or `-` for standard input."""
     kind = click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
     return click.argument("predictions", type=kind)(command)
 
@@ -60,7 +58,6 @@ def url_option(command: Command) -> Command:
 
 
 def unit_option(command: Command) -> Command:
-    """--unit: what intervals and tests take as independent."""
     return click.option(
         "--unit",
         type=click.Choice(list(KINDS)),

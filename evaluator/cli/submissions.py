@@ -202,7 +202,6 @@ def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> fro
 
 
 def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submission:
-    """Wait until the submission is final; print each new state to standard error."""
     last_state = ""
     for submission in client.watch(submission_id, timeout_s=timeout_s):
         if submission.state != last_state and not submission.is_final:
@@ -212,7 +211,7 @@ def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submis
 
 
 def _notice_of(client: Client, method: str) -> str:
-    """Who will see the scores, in the server's words; empty if only the team, or the token may not ask."""
+    """Say who will see the scores; empty if only the team does, or the token may not ask."""
     from evaluator.client.answers import Refused  # noqa: PLC0415 -- loads msgspec
 
     try:
@@ -228,7 +227,6 @@ def _warn(notice: str, *, err: bool) -> None:
 
 
 def _require_consent() -> None:
-    """Ask the person at the terminal; a job without a terminal is not asked."""
     if sys.stdin.isatty() and not click.confirm("Submit?", err=True):
         raise Failure("Nothing was submitted.", exit_code=Exit.USAGE, code="not-confirmed")
 
@@ -240,7 +238,7 @@ def _name_to_send(path: Path) -> str:
 
 
 def _announce(submission: Submission, *, site: str, err: bool) -> None:
-    """Name the submission before waiting for it, so that an interrupted command leaves something to go on."""
+    """Name the submission before waiting, so that the user can continue after an interruption."""
     address = f"  {urljoin(site, submission.url)}" if submission.url else ""
     click.echo(printable(f"Submission {submission.id}{address}"), err=err)
     if not submission.is_new:

@@ -24,7 +24,7 @@ SERVICE = "tsttc"  # under which the keyring files the tokens; the account is th
 
 
 def token_for(url: str) -> str:
-    """The token for the leaderboard at `url`: that of the environment, else that of `tsttc login`."""
+    """Return the token for `url`: from the environment, else from `tsttc login`."""
     value = os.environ.get(TOKEN_VARIABLE)
     if value is not None:
         return checked(value, named=TOKEN_VARIABLE)
@@ -45,7 +45,6 @@ def has_token(url: str) -> bool:
 
 
 def checked(text: str, *, named: str) -> str:
-    """The token that `text` is; raises Failure for one that cannot be sent."""
     value = text.strip().removeprefix("\ufeff")  # editors of Windows begin a file so
     if not value:
         raise Failure(
@@ -73,7 +72,7 @@ def _no_token(words: str, url: str) -> Failure:
 
 
 def kept_token(url: str) -> str | None:
-    """The token for `url` in the keyring or the file; None also if the keyring stays locked."""
+    """Return the token for `url` from keyring or file; None also for a locked keyring."""
     from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
 
     backend = usable_keyring()
@@ -85,7 +84,7 @@ def kept_token(url: str) -> str | None:
 
 
 def keep_token(url: str, token: str) -> str:
-    """Put the token into the keyring, else into the file; gives the name of the place."""
+    """Put the token into the keyring, else into the file; returns the name of the store."""
     from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
 
     backend = usable_keyring()
@@ -99,7 +98,7 @@ def keep_token(url: str, token: str) -> str:
 
 
 def forget_token(url: str) -> bool:
-    """Remove the token from the keyring and from the file; whether there was one."""
+    """Remove the token from keyring and file; returns whether there was one."""
     from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
 
     if kept_token(url) is None:
@@ -119,7 +118,6 @@ def forget_token(url: str) -> bool:
 
 
 def usable_keyring() -> KeyringBackend | None:
-    """The operating system's keyring, if there is one that keeps anything."""
     import keyring  # noqa: PLC0415 -- as the module says
 
     try:
@@ -131,12 +129,10 @@ def usable_keyring() -> KeyringBackend | None:
 
 
 def tokens_file() -> Path:
-    """The file of tokens by server, next to that of settings."""
     return settings_file().with_name("tokens.json")
 
 
 def _kept_in_file() -> dict[str, str]:
-    """The tokens of the file; none where there is none, or it is not what was written."""
     try:
         tokens = json.loads(tokens_file().read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RuntimeError):  # no file, no JSON, no home directory
@@ -145,7 +141,7 @@ def _kept_in_file() -> dict[str, str]:
 
 
 def _keep_in_file(kept: dict[str, str]) -> str:
-    """Write the file, readable for its owner only, and return its name; without tokens, delete it."""
+    """Write the file, readable for its owner only, or delete it without tokens; returns its name."""
     path = tokens_file()
     try:
         if not kept:
@@ -176,7 +172,6 @@ def _text_of(path: Path) -> str:
 
 
 def no_keyring(words: str) -> Failure:
-    """The failure for a keyring that is not there, or does not do its work."""
     return Failure(
         words,
         exit_code=Exit.AUTH,

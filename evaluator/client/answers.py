@@ -18,7 +18,7 @@ JSON = dict[str, Any]
 
 
 class Queue(msgspec.Struct, frozen=True):
-    """Place in the queue: how many evaluations are ahead of this one."""
+    """The number of evaluations ahead of this one."""
 
     ahead: int
 
@@ -56,12 +56,12 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def is_final(self) -> bool:
-        """Whether nothing more will happen to this submission by itself."""
+        """Whether its state is final."""
         return self.state in FINAL_STATES
 
 
 class Method(msgspec.Struct, frozen=True, kw_only=True):
-    """A method; `notice` says who sees its results, where others than its team do."""
+    """A method; `notice` says who sees its results."""
 
     id: str
     name: str
@@ -74,7 +74,7 @@ class Method(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Account(msgspec.Struct, frozen=True, kw_only=True):
-    """Whose token it is; without a `split` it is for all."""
+    """The owner of a token; without a `split` it is valid for all."""
 
     team: str | None
     token: str
@@ -85,7 +85,7 @@ class Account(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ConfidenceInterval(msgspec.Struct, frozen=True, kw_only=True):
-    """The 95 % confidence interval of a value and of its rank in that column; None if unknown."""
+    """The 95 % interval of a value and of its rank; None if unknown."""
 
     low: float | None = None
     high: float | None = None
@@ -114,7 +114,7 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     intervals: dict[str, ConfidenceInterval] = {}
 
     def interval(self, score: str) -> ConfidenceInterval:
-        """The interval of one score; without ends if it was not asked for or is unknown."""
+        """Return the interval of one score, without ends if unknown."""
         return self.intervals.get(score, ConfidenceInterval())
 
 
@@ -137,17 +137,16 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def score_names(self) -> tuple[str, ...]:
-        """The names of its scores, in the server's order."""
         return tuple(dict.fromkeys(name for entry in self.entries for name in entry.scores))
 
     @property
     def updated(self) -> str:
-        """When it last changed, to the second; empty where nothing is known."""
+        """The time of its last change, to the second; empty if unknown."""
         return re.sub(r"\.\d+", "", self.updated_at or "")
 
 
 class RankChange(msgspec.Struct, frozen=True, kw_only=True):
-    """Another row of a board, whose rank changes."""
+    """Another row whose rank changes."""
 
     method: str
     rank_before: int | None = None
@@ -155,7 +154,7 @@ class RankChange(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BoardPreview(msgspec.Struct, frozen=True, kw_only=True):
-    """One split's board as it would be: its row before (None: there is none) and after, and who moves."""
+    """A split's future board: its row before (None without one) and after, and the rank changes."""
 
     split: str
     after: BoardEntry
@@ -165,7 +164,7 @@ class BoardPreview(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Foreseen(msgspec.Struct, frozen=True, kw_only=True):
-    """A preview of what everybody would see of a method."""
+    """A preview of a method's public rows."""
 
     name: str
     document: JSON
@@ -181,7 +180,7 @@ class Pair(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Compared(msgspec.Struct, frozen=True, kw_only=True):
-    """Methods of a board side by side; `reason` says why there are no intervals where there are none."""
+    """A comparison of methods; `reason` explains missing intervals."""
 
     document: JSON
     split: str = ""
@@ -194,13 +193,13 @@ class Compared(msgspec.Struct, frozen=True, kw_only=True):
     n_units: int | None = None
 
     def differences(self) -> dict[str, Difference]:
-        """The differences of the first pair that exist, by score name."""
+        """The differences of the first computed pair, by score name."""
         by_name = (self.pairs[0].differences or {}) if self.pairs else {}
         return {name: difference for name, difference in by_name.items() if difference is not None}
 
 
 class Quota(msgspec.Struct, frozen=True, kw_only=True):
-    """The submissions that the own team has left on a split; None is without limit."""
+    """The own team's remaining submissions on a split; None is without limit."""
 
     split: str
     document: JSON
@@ -212,12 +211,12 @@ class Quota(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ClientError(Exception):
-    """The leaderboard did not give what was asked for."""
+    """A failure of a request."""
 
 
 @dataclass(kw_only=True, eq=False)
 class Unreachable(ClientError):
-    """No whole answer came: nothing listens, the name is unknown, the connection was cut, time ran out."""
+    """No whole answer came: nothing listens, the name is unknown, the connection broke, time ran out."""
 
     url: str
     reason: str
@@ -229,7 +228,7 @@ class Unreachable(ClientError):
 
 @dataclass(kw_only=True, eq=False)
 class Refused(ClientError):
-    """The server answered with an error status. `problems` are listed where the server gave any."""
+    """An error status with the server's `problems`."""
 
     url: str
     status: int
@@ -259,7 +258,7 @@ class BadAnswer(ClientError):
 
 @dataclass(kw_only=True, eq=False)
 class TimedOut(ClientError):
-    """The workers did not finish in time; `submission` is the last state that the server gave."""
+    """The workers did not finish in time; `submission` is the last known state."""
 
     what: str
     timeout_s: float

@@ -53,7 +53,7 @@ N_EARLY_LOOKS, EARLY_LOOK_S = 4, 0.2
 
 
 def _certificates(url: str) -> ssl.SSLContext | bool:
-    """What a connection trusts: nothing where there is no TLS, since reading all certificates takes 40 ms."""
+    # Reading all certificates takes 40 ms, so plain HTTP loads none.
     return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT) if urlsplit(url).scheme == "http" else True
 
 
@@ -287,7 +287,6 @@ class Client:
         return again_s or self.retry_policy.delay_s(n_failed=n_same, retry_after_s=None, rng=self.rng)
 
     def _listed(self, kind: type[T], *path: str) -> Iterator[T]:
-        """The rows of a list, page after page."""
         params: Mapping[str, str] = {}
         while True:
             response = self._retry(partial(self._http.get, self._address(*path), params=params))
@@ -303,7 +302,7 @@ class Client:
         return self._retry(lambda: self._http.get(self._address(*path), params=params))
 
     def _asked_by_anybody(self, *path: str, accept: str, **query: int) -> httpx.Response:
-        """Read public pages without the token, which may lack the right to read."""
+        # Without the token, which may lack the right to read.
         headers = {"Accept": accept}
         request = self._http.build_request("GET", self._address(*path), params=query, headers=headers)
         request.headers.pop("Authorization", None)
@@ -313,7 +312,6 @@ class Client:
         return "/".join([self.url, "api/v1", *(quote(part, safe="") for part in path)])
 
     def _checked(self, send: Callable[[], httpx.Response]) -> httpx.Response:
-        """As `checked`; remembers that the server is one that answers."""
         try:
             response = checked(send, url=self.url)
         except Unreachable as fault:
@@ -326,7 +324,6 @@ class Client:
         return response
 
     def _retry(self, send: Callable[[], httpx.Response]) -> httpx.Response:
-        """Send until answered, as often as the retry policy allows, as long as trying again makes sense."""
         n_failed = 0
         while True:
             try:

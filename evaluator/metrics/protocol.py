@@ -45,7 +45,6 @@ class TTCRange:
 
     @property
     def seconds(self) -> str:
-        """Its ends as a text, such as "0–3 s"."""
         return f"{self.ends} s"
 
 
@@ -105,32 +104,29 @@ class Protocol:
 
     @property
     def boundaries(self) -> dict[str, float]:
-        """The values that truncation can produce, ascending, under the names that reports use."""
+        """The values that truncation can produce, ascending, by name in reports."""
         values = (-self.limit_s, *(self.near_zero_s or ()), self.limit_s)
         return {f"{value:g}": value for value in values}
 
     @cached_property
     def range_names(self) -> tuple[str, ...]:
-        """`overall`, then the TTC ranges in the protocol's order."""
         return (OVERALL, *(ttc_range.name for ttc_range in self.ranges))
 
     @cached_property
     def score_names(self) -> tuple[str, ...]:
-        """The numbers of a result in the order of their columns: `mid`, `mid_crucial`, …, `rte_negative`."""
+        """The names of scores in column order: `mid`, `mid_crucial`, …, `rte_negative`."""
         return tuple(score_name(m.name, ttc_range) for m in self.metrics for ttc_range in self.range_names)
 
     def names_of(self, metric: str) -> tuple[str, ...]:
-        """The scores of one metric; all of them where there is no metric of this name."""
+        """Return the scores of one metric, all scores for an unknown metric."""
         return tuple(name for name in self.score_names if split_name(name)[0] == metric) or self.score_names
 
     @property
     def overall_names(self) -> tuple[str, ...]:
-        """The scores over all sequences, one for each metric."""
         return tuple(metric.name for metric in self.metrics)
 
     @property
     def decimals(self) -> int:
-        """With how many decimals its numbers are shown where no edition says otherwise."""
         return max(metric.decimals for metric in self.metrics)
 
 
@@ -164,7 +160,7 @@ def get_protocol(name: str) -> Protocol:
 
 
 def metric_of(name: str) -> Metric:
-    """The metric of a score. One that only a newer server knows has its name for a symbol, and no unit."""
+    """Return the metric of a score; an unknown one has its name as symbol and no unit."""
     wanted, _ = split_name(name)
     return known_metrics().get(wanted) or Metric(wanted, wanted, "", wanted, 2, MID.function)
 
@@ -180,22 +176,20 @@ def column_words(name: str) -> str:
 
 
 def range_of(name: str) -> TTCRange | None:
-    """The TTC range of a score; None for an overall one, and for one that only a newer server knows."""
+    """Return the TTC range of a score, None for an overall or unknown one."""
     return known_ranges().get(split_name(name)[1])
 
 
 def known_ranges() -> dict[str, TTCRange]:
-    """The TTC ranges of all protocols by their names."""
     return {ttc_range.name: ttc_range for protocol in PROTOCOLS.values() for ttc_range in protocol.ranges}
 
 
 def known_metrics() -> dict[str, Metric]:
-    """The metrics of all protocols by their names."""
     return {metric.name: metric for protocol in PROTOCOLS.values() for metric in protocol.metrics}
 
 
 def known_names() -> tuple[str, ...]:
-    """The names of the scores of all protocols, in an order that is each one's own as well."""
+    """Return the names of scores of all protocols, each protocol's order kept."""
     there = {name for protocol in PROTOCOLS.values() for name in protocol.score_names}
     ranges = (OVERALL, *known_ranges())
     named = (score_name(metric, ttc_range) for metric in known_metrics() for ttc_range in ranges)

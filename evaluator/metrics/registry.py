@@ -32,7 +32,6 @@ class Terms:
 
     @classmethod
     def of(cls, predicted_ttc_s: ArrayLike, true_ttc_s: ArrayLike) -> Terms:
-        """The terms of these times to contact, whose shapes broadcast."""
         import numpy as np  # noqa: PLC0415 -- as the docstring above says
 
         from evaluator.arrays import as_floats  # noqa: PLC0415 -- loads numpy
@@ -85,7 +84,7 @@ class Metric:
 
     @property
     def unit_of_difference(self) -> str:
-        """The same behind the difference of two values."""
+        """The unit after a difference of two values."""
         return " percentage points" if self.unit == "%" else self.unit_of_value
 
 
@@ -113,7 +112,7 @@ def _motion_in_depth_error(terms: Terms) -> Floats:
 
 
 def _relative_ttc_error(terms: Terms) -> Floats:
-    """RTE = |(τ̂ − τ) / τ| · 100 %."""
+    """Compute RTE = |(τ̂ − τ) / τ| · 100 %."""
     import numpy as np  # noqa: PLC0415 -- as the docstring above says
 
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

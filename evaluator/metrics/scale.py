@@ -86,7 +86,7 @@ def scale_ratio_10hz(ttc_s: ArrayLike) -> Floats:
 
 
 def exact_log(values: Floats) -> Floats:
-    """The C library's natural logarithm, as the dataset's toolkit takes it; NaN where it has none."""
+    """Compute the C library's natural logarithm, as the dataset's toolkit does; NaN where undefined."""
     with np.errstate(invalid="ignore"):
         positive = values > 0
     logs = np.full(values.shape, math.nan)

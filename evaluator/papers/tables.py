@@ -1,7 +1,9 @@
-"""All tables of the paper of 2023, as printed; notes name its contradictions.
+"""All tables of the paper of 2023, as printed.
 
-table = published_tables().table("ablation-frame-gap")
-table.value(method="pixel-mse", setting=5, column="mid")  # 41.0
+    table = published_tables().table("ablation-frame-gap")
+    table.value(method="pixel-mse", setting=5, column="mid")  # 41.0
+
+The notes of a table name contradictions of the paper.
 """
 
 from __future__ import annotations
@@ -52,7 +54,7 @@ class PublishedTable(msgspec.Struct, frozen=True):
 
 
 class PublishedTables(msgspec.Struct, frozen=True):
-    """The tables of one paper: `source` says which, `metrics` has units, `methods` the printed names."""
+    """The tables of a paper: `source`, `metrics` with units, printed names of `methods`."""
 
     source: dict[str, Any]
     metrics: dict[str, str]
@@ -60,12 +62,12 @@ class PublishedTables(msgspec.Struct, frozen=True):
     tables: tuple[PublishedTable, ...]
 
     def table(self, name: str) -> PublishedTable:
-        """The table of that name; raises `KeyError`."""
+        """Return the table with this name; raises `KeyError`."""
         return {table.name: table for table in self.tables}[name]
 
 
 @cache
 def published_tables() -> PublishedTables:
-    """The tables of "TSTTC: A Large-Scale Dataset for Time-to-Contact Estimation in Driving Scenarios"."""
+    """Load "TSTTC: A Large-Scale Dataset for Time-to-Contact Estimation in Driving Scenarios"."""
     data = files(__package__).joinpath("tables-2023.json").read_bytes()
     return msgspec.json.decode(data, type=PublishedTables)

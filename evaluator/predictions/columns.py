@@ -52,7 +52,7 @@ _LIST: Final = msgspec.json.Decoder(list[float])
 
 
 def read_column(data: bytes, manifest: Manifest) -> Aligned | None:
-    """The aligned values of a file without surprises, or None for any other."""
+    """Align a regular file's values, or return None."""
     parts = _split(data.removeprefix(BYTE_ORDER_MARK).strip(_WHITE_SPACE))
     if parts is None:
         return None
@@ -82,7 +82,7 @@ def _rates(document: Document, manifest: Manifest) -> Floats:
 
 
 def _split(text: bytes) -> tuple[bytes, Document] | None:
-    """The object of predictions, which has no further object inside, and the document around it."""
+    """Split the object of predictions from the document around it."""
     if text[:1] != b"{" or text[-1:] != b"}":
         return None
     if text.find(b"{", 1) < 0:
@@ -173,7 +173,6 @@ def _by_words(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
 
 
 def _are_separated(buffer: bytearray, octets: NDArray[np.uint8], opens: Rows, *, first_colon: int) -> bool:
-    """Whether the first key follows `{`, and each other one a comma and the same white space."""
     if buffer[_WORD_BYTES : opens[0]].strip(_WHITE_SPACE) != b"{":
         return False
     if len(opens) == 1:
@@ -186,7 +185,7 @@ def _are_separated(buffer: bytearray, octets: NDArray[np.uint8], opens: Rows, *,
 
 
 def _numbers_in(words: Words) -> Words:
-    """The decimal numbers before the last two bytes of words; words without a number give any number."""
+    """Parse the digits before the last two bytes of words; words without digits give any number."""
     other = (words ^ np.uint64(0x303030303030)) & np.uint64(0xF0F0F0F0F0F0)
     # The last byte that is no digit sets all bits before it.
     for n_bits in (1, 2, 4, 8, 16, 32):
@@ -200,7 +199,6 @@ def _numbers_in(words: Words) -> Words:
 
 
 def _by_object(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
-    """Read any keys through a dictionary."""
     n = manifest.n_sequences
     # Keys of the manifest hold no comma. So if every key is one of them, the commas count the members, and a
     # doubled key, of which the dictionary keeps the last, shows as one comma too many.

@@ -120,7 +120,6 @@ def _gap(frame_gap: int | None) -> int:
 def _require_anno_ids(
     names: list[str], natural_keys: Mapping[str, str], findings: Findings, pointer_of: PointerOf
 ) -> None:
-    """Note every way in which the keys of the file are not the anno_ids of the folder."""
     if names and set(natural_keys.values()).issuperset(names):
         message = (
             f"The {len(names):,} keys are natural keys already; expected anno_ids of the toolkit. "
@@ -147,8 +146,6 @@ def _require_anno_ids(
 
 
 def _rates(document: Document, names: list[str], findings: Findings) -> Floats:
-    """The pair rates in Hz, (n,) or (); faults are noted."""
-
     def by_key(members: Members, pointer_of: PointerOf, fault: Fault) -> Floats:
         given = dict(members)
         missing = [key for key in names if key not in given]

@@ -48,7 +48,7 @@ class Members(list[tuple[str, object]]):
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A parsed file: the predictions as they stand in it, and what the envelope says about them."""
+    """A parsed file: the predictions, and the envelope."""
 
     predictions: Members
     unit: Unit
@@ -58,7 +58,6 @@ class Document:
     enveloped: bool
 
     def pointer(self, key: str) -> str:
-        """The JSON pointer to the prediction of `key`."""
         return pointer("predictions", key) if self.enveloped else pointer(key)
 
 
@@ -106,13 +105,12 @@ def parse(data: bytes, *, max_members: int | None = None) -> object:
 
 
 def _hint(data: bytes) -> str:
-    """A sentence on the kind of a file that begins with these bytes; empty if they are of no known kind."""
     kind = next((kind for start, kind in _LOOKS_LIKE.items() if data.startswith(start)), "")
     return f" The file looks like {kind}." if kind else ""
 
 
 def read_document(value: object) -> Document:
-    """The parts of a parsed file; raises `Rejected` for a wrong top level or a faulty envelope."""
+    """Split a parsed file; raises `Rejected` for a wrong top level or envelope."""
     if not isinstance(value, Members):
         message = (
             f"The outermost value is {kind_of(value)}; expected an object of predictions or an envelope."
@@ -252,12 +250,12 @@ def _text(text: str) -> str:
 
 
 def _integer(text: str) -> int | float:
-    """An integer literal; long ones become float64, since Python refuses to read very long ones."""
+    # Python refuses to read very long integers; they become float64.
     return int(text) if len(text) < 300 else float(text)
 
 
 def _depth(body: bytes) -> int:
-    """Depth of nesting, exact for every JSON prefix, so that the recursive parser cannot be driven deep."""
+    # Exact for every JSON prefix, so that no text drives the recursive parser deep.
     if body.count(b"{") + body.count(b"[") <= MAX_DEPTH:
         return 0
     brackets = _brackets(body)
@@ -271,7 +269,6 @@ def _depth(body: bytes) -> int:
 
 
 def _brackets(body: bytes) -> bytearray:
-    """The brackets of a text outside its strings."""
     # Match by match: to remove millions of strings at once would take eighty bytes for each piece left.
     brackets, end = bytearray(), 0
     for string in _STRING.finditer(body):

@@ -107,7 +107,7 @@ def read_predictions(source: Source, *, manifest: Manifest, max_bytes: int | Non
 
 
 def read_sent(data: bytes, *, manifest: Manifest) -> Predictions:
-    """As `read_predictions`, in the forms that a leaderboard takes: bytes of strangers come here."""
+    """Read the forms that a leaderboard accepts, from untrusted bytes; else as `read_predictions`."""
     text = json_of(data, max_rows=2 * manifest.n_sequences + 100_000)
     column = read_column(text, manifest) or read_slowly(text, manifest)
     column.ttc_s.setflags(write=False)
@@ -123,7 +123,6 @@ def read_sent(data: bytes, *, manifest: Manifest) -> Predictions:
 
 
 def sha256_digest(data: bytes) -> str:
-    """`sha256:` and the hex digest of `data`."""
     return "sha256:" + hashlib.sha256(data).hexdigest()
 
 
@@ -165,7 +164,7 @@ def json_of(data: bytes, *, max_rows: int | None = None) -> bytes:
 
 
 def _unpacked(data: bytes) -> bytes:
-    """The content of a gzip archive, of all its members; nothing beyond the limits is ever unpacked."""
+    """Unpack all members of a gzip archive, never beyond the limits."""
     parts, start, n_members, n_left = list[bytes](), 0, 0, MAX_UNPACKED_BYTES
     while start < len(data):
         n_members += 1
@@ -184,7 +183,7 @@ def _unpacked(data: bytes) -> bytes:
 
 
 def _member(data: bytes, start: int, *, max_bytes: int) -> tuple[bytes, int]:
-    """The content of the member that begins at `start`, and where it ends; at most `max_bytes` of content."""
+    """Unpack the member at `start`, at most `max_bytes`; returns its content and end."""
     # A child that reads files may open nothing, and zlib opens nothing.
     reader, parts = zlib.decompressobj(wbits=31), list[bytes]()
     while not reader.eof:
@@ -205,7 +204,7 @@ def _member(data: bytes, start: int, *, max_bytes: int) -> tuple[bytes, int]:
 
 
 def _is_table(data: bytes) -> bool:
-    """Whether the first line names columns of a table; no JSON text begins so."""
+    # No JSON text begins with the columns of a table.
     match = _FIRST_LINE.match(data.removeprefix(b"\xef\xbb\xbf"))
     line = match[1] if match else b""
     fields = line.decode("utf-8", "replace").split(",")
@@ -232,7 +231,7 @@ def _of_table(data: bytes, *, max_rows: int | None) -> bytes:
 
 
 def _lines(text: str, *, max_rows: int | None) -> Iterator[str]:
-    """The lines of a table, its header first; refused before the fields of a line take memory."""
+    """Yield a table's lines, header first; a long line is refused before its fields take memory."""
     for number, line in enumerate(io.StringIO(text, newline="")):
         if max_rows is not None and number > max_rows:
             message = f"The table has more than {max_rows:,} rows; expected one for each sequence."

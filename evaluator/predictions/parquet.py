@@ -39,7 +39,6 @@ def as_sent(data: bytes) -> bytes:
 
 
 def _columns(schema: Any) -> tuple[list[str], list[str]]:
-    """The columns of the key and those of the numbers, each of a type that can be what its name says."""
     from evaluator.predictions.loading import columns_of  # noqa: PLC0415 -- which asks this module
 
     keys, value, rate = columns_of(schema.names)
@@ -75,7 +74,6 @@ def _is_fitting(column_type: Any, *, is_key: bool) -> bool:
 
 
 def _rows(table: Any, keys: list[str], values: list[str]) -> Iterator[Sequence[str | None]]:
-    """The fields as text, of numbers the shortest that means the same; None where a value is missing."""
     number = 0
     for batch in table.iter_batches(columns=keys + values, use_threads=False):
         columns = [map(_text, batch.column(name).to_pylist()) for name in keys + values]

@@ -42,13 +42,13 @@ Pairs = NDArray[np.intp]
 
 
 def warnings_of(predictions: Predictions) -> list[FileWarning]:
-    """Warnings from the file and its manifest, without any true value."""
+    """Warn of a file by its manifest, without true values."""
     manifest, ttc_s = predictions.manifest, predictions.ttc_s
     return [*unit_warnings(ttc_s), *_sign_warnings(manifest, ttc_s), *_order_warnings(manifest, ttc_s)]
 
 
 def unit_warnings(ttc_s: Floats) -> list[FileWarning]:
-    """Warnings from the values alone, (n,): whether they look like another unit than seconds."""
+    """Warn of values (n,) that look like another unit than seconds."""
     n = len(ttc_s)
     if n < MIN_VALUES:
         return []
@@ -143,7 +143,7 @@ def roughness(manifest: Manifest, ttc_s: Floats) -> float | None:
 
 
 def order_of(ttc_s: Floats) -> Floats:
-    """The rank of each value by scale ratio, float64 (n,); equal values share the mean of theirs."""
+    """Rank values by scale ratio, float64 (n,), ties at their mean."""
     with np.errstate(divide="ignore", over="ignore"):
         _, index, counts = np.unique(-1 / ttc_s, return_inverse=True, return_counts=True)
     ends = np.cumsum(counts)
@@ -158,7 +158,6 @@ def _mean_difference(ranks: Floats, pairs: Pairs) -> float:
 
 @lru_cache(maxsize=4)  # by the manifest itself, which every file of a split shares
 def _pairs(manifest: Manifest) -> tuple[Pairs, Pairs]:
-    """Rows (n, 2) of neighbouring windows of one object, and of successive windows of two, per camera."""
     cameras = _numbered([f"{b}/{c}" for b, c in zip(manifest.bag_stamp, manifest.cam_id, strict=True)])
     tracks = _numbered(list(manifest.track_id))
     by_track = np.lexsort((manifest.ts_ns, tracks, cameras))

@@ -18,7 +18,7 @@ from evaluator.truth.ground_truth import Manifest
 
 
 def warm_up(manifest: Manifest) -> None:
-    """Run every branch that imports late, and make the manifest's keys: nothing can be opened afterwards."""
+    # Late imports and the manifest's keys: nothing can be opened afterwards.
     _ = key_words(manifest), manifest.row_of_natural_key
     for sample in (
         b"{",
@@ -40,7 +40,6 @@ def warm_up(manifest: Manifest) -> None:
 
 
 def answer(data: bytes, *, manifest: Manifest) -> bytes:
-    """The header line for these bytes, and the values behind it if they are good."""
     try:
         predictions = read_sent(data, manifest=manifest)
     except Rejected as rejected:
@@ -57,7 +56,7 @@ def answer(data: bytes, *, manifest: Manifest) -> bytes:
 
 
 def main() -> None:
-    """Arguments: manifest file, memory limit in bytes, processor time in seconds."""
+    """Run with the arguments: manifest file, memory limit in bytes, processor time in seconds."""
     obey_the_parent_alone()
     manifest = Manifest.load(Path(sys.argv[1]))
     warm_up(manifest)

@@ -36,7 +36,6 @@ N_DESCRIPTORS: Final = 3
 
 
 def _manifest(path: str) -> Manifest:
-    """The manifest in a file as it is now; raises `OSError` or `Rejected` where there is none."""
     status = Path(path).stat()
     return _loaded(path, status.st_ino, status.st_mtime_ns)
 
@@ -51,7 +50,6 @@ def _loaded(path: str, _inode: int, _mtime_ns: int) -> Manifest:
 
 
 def serve(connection: socket.socket) -> None:
-    """Answer requests until the other end is closed."""
     while True:
         packet, descriptors, _, _ = socket.recv_fds(connection, MAX_PACKET_BYTES, N_DESCRIPTORS)
         if not packet:
@@ -98,7 +96,6 @@ def _send(connection: socket.socket, reply: dict[str, object]) -> None:
 def _read(
     descriptors: list[int], *, manifest: Manifest, server: int, memory_bytes: int, cpu_s: int
 ) -> NoReturn:
-    """The child: give up all rights, read the file, answer, end."""
     code = 1
     try:
         for number, descriptor in enumerate(descriptors):
@@ -127,7 +124,6 @@ def _answer(manifest: Manifest, *, memory_bytes: int, cpu_s: int) -> int:
 
 
 def main() -> None:
-    """Serve on the socket that is standard input."""
     obey_the_parent_alone()
     keep_memory_private()
     # What a library of the worker has opened without care is none of a reader's business.

@@ -40,7 +40,7 @@ def compare(old: GroundTruth, new: GroundTruth) -> Comparison:
 
 
 def rows_in(old: Manifest, new: Manifest) -> Rows:
-    """For every sequence of `new` its row in `old`, (n,); -1 where `old` does not have it."""
+    """Find the row in `old` of every sequence of `new`, (n,); -1 if absent."""
     if old.digest == new.digest:
         # The same sequences under the same numbers, whose rows may stand in another order.
         rows = np.empty(new.n_sequences, dtype=np.intp)
@@ -64,7 +64,7 @@ def realigned(predictions: Predictions, *, manifest: Manifest) -> Predictions:
 
 
 def absent(rows: Rows, *, manifest: Manifest) -> Rejected:
-    """The rejection of a file whose own manifest did not have these rows of `manifest`, to be raised."""
+    """Make the rejection for these rows of `manifest`, which the file's own manifest lacks."""
     names = [manifest.natural_keys[row] for row in rows.tolist()]
     n = len(names)
     what = counted(n, "sequence has", "sequences have")

@@ -26,7 +26,6 @@ class Rule:
     shown: str = "{}"
 
     def message(self, value: float) -> str:
-        """The problem of this value in a sentence."""
         return f"The value is {self.shown.format(kind_of(value))}; expected {self.expected}."
 
 
@@ -49,12 +48,11 @@ RULES: Final[dict[Unit, tuple[Rule, ...]]] = {
 
 
 def broken_rule(value: float, *, unit: Unit) -> Rule | None:
-    """The first rule that a value breaks; None where a file may hold it."""
+    """Return the first rule that a value breaks, else None."""
     return next((rule for rule in RULES[unit] if not rule.holds(value)), None)
 
 
 def allowed(values: Floats, *, unit: Unit) -> NDArray[np.bool_]:
-    """Whether a file may hold each of these values, of their shape."""
     is_allowed = np.ones(values.shape, dtype=np.bool_)
     for rule in RULES[unit]:
         is_allowed &= rule.holds(values)

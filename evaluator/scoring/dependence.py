@@ -24,7 +24,7 @@ N_PERMUTATIONS: Final = 1_999
 
 @dataclass(frozen=True, slots=True)
 class Dependence:
-    """Standard error by units over that by recordings, correlation within a unit, and its one-sided p."""
+    """Standard error by units over that by recordings, correlation within a unit, one-sided p."""
 
     se_factor: float
     correlation: float

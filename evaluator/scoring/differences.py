@@ -79,13 +79,13 @@ def sign_flips(
 
 
 def _nothing_left(twice: Floats, nothing: Floats) -> Floats:
-    """Sums of the same numbers in another order differ by rounding: what is left of nothing is 0."""
+    # Sums of the same numbers in another order differ by rounding: the rest of nothing is 0.
     twice[np.abs(twice) <= nothing] = 0.0
     return twice
 
 
 def _stretches(plus: Floats, minus: Floats) -> tuple[Floats, Floats]:
-    """Between which differences two halves disagree, from sums over numbers, (2 columns, n) each."""
+    """Compute the differences about which two halves disagree, from sums and numbers, (2 columns, n)."""
     n_columns = len(plus) // 2
     is_empty = (plus[n_columns:] == 0) | (minus[n_columns:] == 0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -95,7 +95,7 @@ def _stretches(plus: Floats, minus: Floats) -> tuple[Floats, Floats]:
 
 
 def _ends(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
-    """Where the interval of every column begins and ends, (columns,) each, by its stretches (columns, R)."""
+    """Compute each column's interval, (columns,) low and high, from stretches (columns, R)."""
     n_flips = lower.shape[1]
     k = next(k for k in range(n_flips + 1) if (1 + k) / (n_flips + 1) >= SIGNIFICANT)
     if k == 0:

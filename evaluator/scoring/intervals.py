@@ -15,7 +15,7 @@ from evaluator.truth.ground_truth import GroundTruth
 def recording_sums(
     predictions: Predictions, truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL
 ) -> RecordingSums:
-    """Sums per recording of one set of predictions; raises as `evaluator.evaluate` does."""
+    """Sum errors per recording; raises as `evaluate` does."""
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
     bags = Scorer(truth, rules).report(predictions, keep_bags=True).bags
     assert bags is not None  # noqa: S101 - they were asked for

@@ -55,14 +55,14 @@ class Quoted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RankRanges:
-    """Where each of N entries may stand in each of the columns, int64 (N, columns); 0 where there is none."""
+    """Lowest and highest rank of N entries in each column, int64 (N, columns); 0 if absent."""
 
     low: Integers
     high: Integers
 
     @property
     def is_with_best(self) -> Booleans:
-        """Which may be the best of their column, at 95 %: those whose range begins at 1."""
+        """Whether the range begins at 1."""
         return np.asarray(self.low == 1)
 
 
@@ -100,7 +100,7 @@ def rank_ranges(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rows:
-    """What takes part in a column: its entries, then both ends of its quoted rows. `sums` are (n, G)."""
+    """The rows of a column: entries, then both ends of quoted rows. `sums` are (n, G)."""
 
     sums: Floats
     values: Floats
@@ -120,7 +120,6 @@ class _Pairs:
     is_two_sided: Booleans
 
     def of(self, chosen: NDArray[np.intp] | slice) -> _Pairs:
-        """Those of them."""
         return _Pairs(*(getattr(self, name)[chosen] for name in _Pairs.__slots__))
 
 
@@ -145,7 +144,7 @@ def _exact(sums: Floats) -> Floats:
 
 
 def _count_significant(rows: _Rows, signs: Floats, between: Callable[[], None]) -> tuple[Integers, Integers]:
-    """Count for every row how many are significantly better, and how many worse: step-down over all pairs."""
+    """Count the rows significantly better and worse than each row, by step-down over all pairs."""
     blocks = []
     for start in range(0, len(rows.values), _ROWS):
         between()
@@ -166,7 +165,7 @@ def _count_significant(rows: _Rows, signs: Floats, between: Callable[[], None]) 
 
 
 def _measured(rows: _Rows, start: int) -> _Pairs:
-    """The pairs of some rows with all before them, by ΣD² = Q_aa + Q_bb − 2 Q_ab."""
+    """Pair some rows with all before them, by ΣD² = Q_aa + Q_bb − 2 Q_ab."""
     own = rows.sums[start : start + _ROWS]
     stop = start + len(own)
     nth, earlier = np.tril_indices(len(own), start - 1, stop)
@@ -194,7 +193,7 @@ def _measured(rows: _Rows, start: int) -> _Pairs:
 
 
 def _largest_up_to(turned: Weights, pairs: _Pairs, between: Callable[[], None]) -> Weights:
-    """In every draw the largest rise over the first 0, 1, 2, … blocks, and over all opposites."""
+    """Compute for every draw the largest t over the first 0, 1, 2, … blocks, and over all opposites."""
     rises = [np.zeros(turned.shape[1], dtype=np.float32)]
     opposite = rises[0]
     for start in range(0, len(pairs.t), _BLOCK):

@@ -60,7 +60,6 @@ class Report:
         return "\n".join([*lines, f"{counted(self.n_sequences, 'sequence')}, protocol {self.protocol}"])
 
     def _repr_html_(self) -> str:
-        """The table of a notebook."""
         header, *rows = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in self._rows()]
         body = "".join(f"<tr>{row}</tr>" for row in rows)
         head = f"<tr>{header.replace('td>', 'th>')}</tr>"
@@ -158,7 +157,7 @@ class Report:
         return plots.draw(kind, {key: report.require_details() for key, report in reports.items()}, path=path)
 
     def require_details(self) -> Details:
-        """The details, or a `ValueError` that says how to get them."""
+        """Return the details; raises `ValueError` that says how to get them."""
         if self.details is None:
             raise ValueError(
                 "The report has no errors of single sequences; call evaluate(…, keep_sequences=True)."

@@ -21,12 +21,10 @@ class RangeScore:
 
     @property
     def mid(self) -> float | None:
-        """The mean motion-in-depth error."""
         return self.means["mid"]
 
     @property
     def rte(self) -> float | None:
-        """The mean relative TTC error."""
         return self.means["rte"]
 
     def as_dict(self) -> dict[str, float | int | None]:

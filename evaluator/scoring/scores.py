@@ -84,12 +84,11 @@ class Scorer:
 
     @cached_property
     def _recordings(self) -> NDArray[np.int64]:
-        """The recording of every sequence, in ascending τ."""
         return self._truth.manifest.recording_index[self._truth.ascending_rows]
 
     @cached_property
     def recording_counts(self) -> Floats:
-        """Sequences per recording in every column: the counts of all `RecordingSums` of this truth."""
+        """Count sequences per recording and column."""
         n_bags = self._truth.manifest.n_recordings
         parts = [self._recordings[part] for part in self._slices.values()] * len(self._protocol.metrics)
         counts = np.stack([np.bincount(part, minlength=n_bags) for part in parts], axis=1)
@@ -107,7 +106,7 @@ class Scorer:
     def report(
         self, predictions: Predictions, *, keep_sequences: bool = False, keep_bags: bool = False
     ) -> Report:
-        """The report on one set of predictions; raises as `evaluate` does."""
+        """Score one set of predictions; raises as `evaluate` does."""
         require(predictions, Predictions, name="predictions")
         if predictions.manifest is not self._truth.manifest:
             if predictions.manifest.digest != self._truth.manifest.digest:
@@ -146,7 +145,7 @@ class Scorer:
         return Details(self._truth, predictions, predicted_ttc_s, in_file_order, self._protocol)
 
     def _errors(self, predictions: Predictions) -> tuple[dict[str, Floats], tuple[int, ...]]:
-        """Errors by metric in ascending τ, and the number of predictions that went to each boundary."""
+        """Compute errors by metric in ascending τ, and the predictions truncated to each boundary."""
         truth = self._truth
         # Made with the first file of a truth, and better before the arrays below need memory too.
         true_log = truth.ascending_log_scale_ratio
@@ -162,7 +161,7 @@ class Scorer:
 
 
 def _truncate(ttc_s: Floats, protocol: Protocol) -> tuple[Floats, tuple[int, ...]]:
-    """The truncated values, a new array, and the number of changed values per boundary. 0 and NaN stay."""
+    """Truncate to a new array, and count the changes per boundary; 0 and NaN stay."""
     limit_s = protocol.limit_s
     truncated = np.clip(ttc_s, -limit_s, limit_s)
     n_low, n_high = int(np.count_nonzero(ttc_s < -limit_s)), int(np.count_nonzero(ttc_s > limit_s))
@@ -176,7 +175,6 @@ def _truncate(ttc_s: Floats, protocol: Protocol) -> tuple[Floats, tuple[int, ...
 
 
 def _refuse(predictions: Predictions, protocol: Protocol) -> NoReturn:
-    """Name the values that the protocol forbids, in file order."""
     findings = Findings()
     ttc_s, _ = _truncate(predictions.ttc_s, protocol)
     alpha = scale_ratio_10hz(ttc_s)
@@ -196,7 +194,7 @@ def _refuse(predictions: Predictions, protocol: Protocol) -> NoReturn:
 
 
 def floor_of(truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL) -> dict[str, float | None]:
-    """The scores of the ground truth itself; None for a TTC range without sequences."""
+    """Score the ground truth itself; None for an empty TTC range."""
     predictions = Predictions.from_arrays(ttc_s=truth.ttc_s, manifest=truth.manifest)
     return evaluate(predictions, truth, protocol=protocol).flat()
 

@@ -62,7 +62,6 @@ class Difference:
     unit: str = field(default=RECORDING, repr=False)
 
     def __post_init__(self) -> None:
-        """Give `p_below` where p says it."""
         if self.p_below is None and self.p is not None:
             object.__setattr__(self, "p_below", p_below(self.p))
 
@@ -128,7 +127,6 @@ def significant_together(differences: Sequence[Difference]) -> list[bool]:
 
 
 def _upper(difference: Difference) -> float | None:
-    """The p of a difference, else what it is below."""
     return difference.p_below if difference.p is None else difference.p
 
 
@@ -145,5 +143,5 @@ def too_few_units(n_effective: float | None, *, unit: str = RECORDING) -> str:
 
 
 def cut_off(n_effective: float) -> float:
-    """An effective number with one decimal, not rounded: what is too few never reads as enough."""
+    """Format an effective number with one decimal, cut off: too few never reads as enough."""
     return math.floor(10 * n_effective) / 10

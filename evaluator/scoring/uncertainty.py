@@ -34,7 +34,7 @@ Booleans = NDArray[np.bool_]
 
 
 def generator_of(digest: str, *, purpose: str) -> np.random.Generator:
-    """The random numbers that belong to a ground truth's revision; each purpose has its own."""
+    """Return the random numbers of a ground truth's revision, by purpose."""
     seed = hashlib.sha256(f"{purpose} {digest}".encode()).digest()
     return np.random.default_rng(int.from_bytes(seed))
 
@@ -57,7 +57,7 @@ def degrees_of(counts: Floats) -> Floats:
 
 
 def usable_columns(counts: Floats) -> Booleans:
-    """Which columns of `counts` (G, columns) have enough units: at least 8 degrees of freedom."""
+    """Find the columns of `counts` (G, columns) with at least 8 degrees of freedom."""
     return np.asarray(degrees_of(counts) >= MIN_DEGREES)
 
 
@@ -74,7 +74,6 @@ class Bootstrap:
 
     @cached_property
     def usable(self) -> Booleans:
-        """Which columns have enough units."""
         return usable_columns(self._counts)
 
     @cached_property
@@ -88,12 +87,12 @@ class Bootstrap:
 
     @cached_property
     def _inverse_counts(self) -> Weights:
-        """1 / Σwn of the usable columns in every resample, (usable, B)."""
+        """1 / Σwn of the usable columns, (usable, B)."""
         weighted = self._counts.T.astype(np.float32) @ self._weights
         return np.asarray(1 / weighted[self.usable])
 
     def means(self, sums: Floats) -> Floats:
-        """θ of every column, for sums (…, G, columns); NaN for a column without sequences."""
+        """Compute θ of every column from sums (…, G, columns); NaN without sequences."""
         with np.errstate(invalid="ignore"):
             return np.asarray(sums.sum(axis=-2) / self._n)
 
@@ -159,7 +158,7 @@ def _student(degrees: float) -> float:
 
 
 def _ends(deviations: Weights, *, tail: float) -> Floats:
-    """The quantiles `tail` and 1 − `tail` of every row, (2, rows), as `numpy.quantile` takes them."""
+    """Compute the quantiles `tail` and 1 − `tail` of every row, (2, rows), as `numpy.quantile` does."""
     last = deviations.shape[1] - 1
     positions = [tail * last, (1 - tail) * last]
     indices = sorted({i for position in positions for i in (int(position), min(int(position) + 1, last))})
@@ -173,5 +172,4 @@ def _ends(deviations: Weights, *, tail: float) -> Floats:
 
 
 def bootstrap_of(truth_digest: str, counts: Floats) -> Bootstrap:
-    """The weights that belong to a ground truth's revision."""
     return Bootstrap(counts, rng=generator_of(truth_digest, purpose="weights"))

@@ -124,7 +124,6 @@ def _latex_character(character: str) -> str:
 
 
 def latex_comment(text: str) -> str:
-    """A line that LaTeX does not read."""
     return f"% {one_line(text)}".rstrip()
 
 
@@ -176,5 +175,4 @@ def csv_cell(value: object) -> str:
 
 
 def csv_line(cells: Iterable[object], *, end: str = "\r\n") -> str:
-    """A row of a CSV table, with the end of its line."""
     return ",".join(map(csv_cell, cells)) + end

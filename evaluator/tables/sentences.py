@@ -89,7 +89,7 @@ def _direction(difference: float) -> str:
 
 
 def _ends(difference: float, low: float, high: float, digits: int) -> str:
-    """From the smaller effect to the larger one, each with its own direction where they have two."""
+    """Order an interval's ends by size, each with its direction if the directions differ."""
     near, far = (high, low) if difference < 0 else (low, high)
     start = _amount(near, digits)
     if near and (near < 0) != (far < 0):
@@ -98,13 +98,13 @@ def _ends(difference: float, low: float, high: float, digits: int) -> str:
 
 
 def _amount(value: float, digits: int) -> str:
-    """Its size; what is not 0 has at least one unit of the last digit."""
+    # What is not 0 has at least one unit of the last digit.
     unit = 10.0**-digits
     return f"{max(abs(value), unit) if value else 0.0:.{digits}f}"
 
 
 def _digits(difference: Difference, decimals: int) -> int:
-    """The decimals that give the half width two digits and show the difference; at most `decimals`."""
+    """Choose decimals, at most `decimals`, that show the difference and two digits of the half width."""
     if difference.low is None or difference.high is None:
         return decimals
     half = (difference.high - difference.low) / 2

@@ -17,7 +17,7 @@ from evaluator.truth.annotations import read_files
 
 
 def files_of(source: IO[bytes], answers: IO[bytes]) -> Iterator[tuple[str, bytes]]:
-    """The files that come in, each answered when the next is asked for."""
+    """Yield the files; each is answered when the next is asked for."""
     while line := source.readline():
         header = json.loads(line)
         yield header["name"], source.read(int(header["n_bytes"]))
@@ -26,7 +26,7 @@ def files_of(source: IO[bytes], answers: IO[bytes]) -> Iterator[tuple[str, bytes
 
 
 def warm_up() -> None:
-    """Run every branch that imports late, since nothing can be opened afterwards."""
+    # Late imports: nothing can be opened afterwards.
     try:
         read_files([("", b"cos\nsystem\n.")], with_ttc=True)
     except Rejected as rejected:
@@ -34,7 +34,7 @@ def warm_up() -> None:
 
 
 def main() -> None:
-    """Arguments: memory in bytes, processor time in seconds, and 1 or 0: true times, boxes, all frames."""
+    """Run with memory in bytes, processor time in seconds, and three flags: true times, boxes, all frames."""
     obey_the_parent_alone()
     warm_up()
     with_ttc, with_boxes, with_frames = (argument == "1" for argument in sys.argv[3:6])

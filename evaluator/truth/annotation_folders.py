@@ -77,7 +77,7 @@ def read_annotations(
 
 
 def list_files(folder: Path) -> list[Path]:
-    """The annotation files below `folder`, in the order in which the toolkit would read them here."""
+    """List the annotation files below `folder` in the order of the toolkit on this machine."""
 
     def cannot_list(error: OSError) -> None:
         where = Path(error.filename).name if error.filename else folder.name
@@ -93,7 +93,6 @@ def list_files(folder: Path) -> list[Path]:
 
 
 def _contents(folder: Path, files: Sequence[Path]) -> Iterator[tuple[str, bytes]]:
-    """Name and content of each file, one at a time."""
     for path in files:
         name = path.relative_to(folder).as_posix()
         try:
@@ -223,7 +222,6 @@ def _end_of(child: subprocess.Popen[bytes], *, memory_bytes: int) -> tuple[str, 
 
 
 def _decoded(line: bytes, where: str) -> AnnotatedFiles:
-    """The child's answer; raises `Rejected` when that is what it says, or when it says nothing known."""
     try:
         answer: dict[str, Any] = json.loads(line)
         if "problems" in answer:
@@ -238,7 +236,6 @@ def _decoded(line: bytes, where: str) -> AnnotatedFiles:
 
 
 def _table(columns: dict[str, Any]) -> Table:
-    """Raises `TypeError` or `ValueError` for columns of another kind or length than `Table` says."""
     table = Table(**columns)
     for name, kinds in _KINDS.items():
         column = getattr(table, name)

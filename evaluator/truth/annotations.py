@@ -91,7 +91,6 @@ def cut_sequences(camera: Camera, *, n_frames: int = N_FRAMES) -> Iterator[list[
 
 
 def _cameras(data: bytes, name: str) -> list[Camera]:
-    """The cameras of one annotation file, with their structure checked."""
     cameras = load_plain(data, where=name)
     fault = _structure_fault(cameras)
     if fault:
@@ -184,13 +183,11 @@ def _add_row(table: Table, target: Attributes, findings: Findings, where: str, *
 
 
 def _ttc_s(seen: Attributes) -> float:
-    """The true time to contact of a frame, NaN where it has none."""
     ttc_s = seen.get("ttc_imu")
     return float(cast("float", ttc_s)) if _is_number(ttc_s) else math.nan
 
 
 def _box(seen: Attributes, findings: Findings, where: str) -> list[float]:
-    """The four numbers of `box2d`."""
     box = seen.get("box2d")
     numbers = _numbers(box)
     if numbers is not None:
@@ -201,7 +198,6 @@ def _box(seen: Attributes, findings: Findings, where: str) -> list[float]:
 
 
 def _numbers(box: object) -> list[float] | None:
-    """The four numbers of an array, a list or a tuple; None for anything else."""
     numbers = box.numbers if isinstance(box, FewNumbers) else box
     if isinstance(numbers, list | tuple) and len(numbers) == 4 and all(map(_is_number, numbers)):
         return [float(number) for number in numbers]

@@ -131,7 +131,7 @@ def name_fault(text: str) -> str | None:
 
 
 def read_text(source: Source) -> str:
-    """The text of a UTF-8 file, with or without a byte order mark. Raises `Rejected`."""
+    """Read UTF-8 text, with or without a byte order mark. Raises `Rejected`."""
     try:
         return data_of(source).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -154,7 +154,6 @@ def read_csv(source: Source, *, with_ttc: bool) -> Table:
 
 
 def _of_objects(header: list[str], columns: tuple[str, ...]) -> dict[str, int]:
-    """The positions of the object columns; empty for a manifest."""
     return {name: header.index(name) for name in OBJECT_COLUMNS if name in header and "ttc" in columns}
 
 
@@ -229,7 +228,7 @@ def save_store(
     manifest_digest: str,
     truth_digest: str | None = None,
 ) -> None:
-    """Write columns and digests as an `.npz` without pickled objects, not compressed for speed."""
+    """Write columns and digests as `.npz`, without pickles and uncompressed."""
     arrays: dict[str, Any] = {
         "manifest_digest": np.array(manifest_digest),
         **columns,
@@ -241,7 +240,7 @@ def save_store(
 
 
 def load_store(path: str | os.PathLike[str], *, with_ttc: bool) -> tuple[Table, str, str]:
-    """The table, the manifest's digest and the truth's, if any; raises `Rejected` for other files."""
+    """Read a table, the manifest's digest and the truth's, if any; raises `Rejected` for other files."""
     path = Path(path)
     try:
         # numpy leaves its own file open when it fails.

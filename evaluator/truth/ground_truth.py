@@ -94,12 +94,11 @@ class Manifest:
 
     @cached_property
     def anno_id_keys(self) -> tuple[str, ...]:
-        """The anno_ids as they are written in a prediction file."""
         return tuple(map(str, self.anno_id.tolist()))
 
     @cached_property
     def rows_by_id(self) -> NDArray[np.intp] | slice:
-        """The rows in ascending anno_id, an index for arrays: all of them where they stand so already."""
+        """The rows in ascending anno_id, as an index for arrays."""
         if (self.anno_id[1:] > self.anno_id[:-1]).all():
             return slice(None)
         return np.argsort(self.anno_id)
@@ -111,7 +110,6 @@ class Manifest:
 
     @cached_property
     def row_of_natural_key(self) -> dict[str, int]:
-        """The row of every natural key."""
         return {key: row for row, key in enumerate(self.natural_keys)}
 
     @cached_property
@@ -121,7 +119,7 @@ class Manifest:
 
     @cached_property
     def recording_index(self) -> Integers:
-        """For every sequence, the index of its recording in `recordings`."""
+        """The index in `recordings` of every sequence."""
         index = {bag: i for i, bag in enumerate(self.recordings)}
         array = np.array([index[bag] for bag in self.bag_stamp], dtype=np.int64)
         array.setflags(write=False)
@@ -165,7 +163,6 @@ class Manifest:
 
     @cached_property
     def _columns(self) -> dict[str, NDArray[Any]]:
-        """The arrays that `save` writes, here and in the ground truth."""
         return {
             "anno_id": self.anno_id,
             "bag_stamp": np.array(self.bag_stamp, dtype=np.str_),
@@ -202,7 +199,7 @@ class GroundTruth:
 
     @classmethod
     def from_table(cls, table: Table) -> GroundTruth:
-        """Check rows and values; raises `Rejected` naming the rows at fault."""
+        """Check rows and values; raises `Rejected` that names the rows at fault."""
         manifest_digest, digest = table.digests()
         manifest = Manifest._checked(table, manifest_digest)
         ttc_s = np.array(table.ttc_s, dtype=np.float64)
@@ -222,7 +219,6 @@ class GroundTruth:
 
     @cached_property
     def ascending_ttc_s(self) -> Floats:
-        """τ in ascending order."""
         return self.ttc_s[self.ascending_rows]
 
     @cached_property
@@ -326,7 +322,7 @@ def _find_duplicates(findings: Findings, code: str, noun: str, keys: Sequence[st
 
 
 def _find_two_units(findings: Findings, table: Table) -> None:
-    """A recording lies in one unit: its sequences are not independent of each other."""
+    # Sequences of one recording are dependent, so a recording has one unit.
     first: dict[str, int] = {}
     for row, (recording, unit) in enumerate(zip(table.bag_stamp, table.unit, strict=bool(table.unit))):
         earlier = first.setdefault(recording, row)

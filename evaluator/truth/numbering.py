@@ -21,14 +21,14 @@ from evaluator.truth.ground_truth import Manifest
 
 @dataclass(frozen=True, eq=False)
 class Numbering:
-    """A manifest, and for each anno_id of the toolkit, 0 to n - 1, the row of the manifest: (n,)."""
+    """A manifest, and for each anno_id of the toolkit, 0 to n - 1, the manifest's row: (n,)."""
 
     manifest: Manifest
     rows: NDArray[np.intp]
 
     @property
     def n_renumbered(self) -> int:
-        """The number of anno_ids for which the toolkit and the manifest name different sequences."""
+        """The number of anno_ids that name different sequences in toolkit and manifest."""
         return int(np.count_nonzero(self.manifest.anno_id[self.rows] != np.arange(len(self.rows))))
 
     @cached_property
@@ -65,7 +65,7 @@ def read_numbering(folder: str | Path, *, manifest: Manifest | None = None) -> N
 
 
 def require_the_same(own: Sequence[str], wanted: Sequence[str], where: str) -> None:
-    """Raise `Rejected` where a folder's natural keys are not those of a manifest, whatever their order."""
+    """Raise `Rejected` if the natural keys of folder and manifest differ."""
     findings = Findings()
     for code, missing, words in (
         ("missing-keys", sorted(set(wanted) - set(own)), "The folder lacks sequences of the manifest ({})"),

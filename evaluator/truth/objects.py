@@ -45,7 +45,7 @@ class Objects:
         same_lane: Sequence[bool | None],
         box2d: Sequence[Sequence[float] | None],
     ) -> Objects:
-        """From the columns of a table; one without any value is absent."""
+        """Read the columns of a table; an empty one is absent."""
         return cls(
             occ_ratio=_floats(occ_ratio),
             same_lane=_floats(same_lane),
@@ -53,7 +53,6 @@ class Objects:
         )
 
     def to_columns(self) -> tuple[list[float | None], list[bool | None], list[list[float] | None]]:
-        """The columns of a table, in the order of `OBJECT_COLUMNS`."""
         return (
             [None if math.isnan(value) else value for value in _items(self.occ_ratio)],
             [None if math.isnan(value) else value == 1 for value in _items(self.same_lane)],
@@ -62,7 +61,6 @@ class Objects:
 
     @property
     def box_height(self) -> Floats | None:
-        """Height of the boxes as a part of the image's height, (n,)."""
         return None if self.box2d is None else self.box2d[:, 3] - self.box2d[:, 1]
 
 
@@ -152,7 +150,6 @@ def text_of(value: float | bool | Sequence[float] | None) -> str:
 
 
 def is_box(box: Sequence[float]) -> bool:
-    """Whether these four numbers are a box in parts of an image."""
     if len(box) != 4 or not all(abs(number) <= _FARTHEST for number in box):  # NaN is not either
         return False
     x1, y1, x2, y2 = box
@@ -163,14 +160,12 @@ def is_box(box: Sequence[float]) -> bool:
 
 
 def plain_occ_ratio(value: object) -> float | None:
-    """A number from 0 to 1."""
     if isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value <= 1:
         return float(value)
     return None
 
 
 def plain_same_lane(value: object) -> bool | None:
-    """True or False, also as 1 or 0."""
     if isinstance(value, bool) or (isinstance(value, int | float) and value in (0, 1)):
         return bool(value)
     return None

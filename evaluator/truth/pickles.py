@@ -47,7 +47,7 @@ class Attributes(dict[Any, Any]):
     __slots__ = ()
 
     def __setstate__(self, state: Any) -> None:
-        """Make items of what the foreign class has kept as attributes, where it has no such items."""
+        # Foreign classes may keep their items as attributes.
         for part in state if isinstance(state, tuple) else (state,):
             for name, value in dict(part or {}).items():
                 self.setdefault(name, value)
@@ -76,7 +76,7 @@ class FewNumbers:
 
     @property
     def numbers(self) -> list[float] | None:
-        """The numbers as they stand in memory, whatever the shape; None for an array of many."""
+        """The numbers as stored, without shape; None for a long array."""
         if self._dtype is None:
             return None
         try:
@@ -86,7 +86,7 @@ class FewNumbers:
 
 
 class _Dtype:
-    """The type of a number; not numpy's, which all arrays of a program share."""
+    # Not numpy's type, which all arrays of a program share.
 
     __slots__ = ("kind",)
     kind: np.dtype[Any]
@@ -107,7 +107,7 @@ class _Dtype:
 
 
 class _Made:
-    """What makes other things than itself. No state is set, neither of one nor of the class."""
+    """A class whose calls make other objects; neither has state."""
 
     __slots__ = ()
 
@@ -126,14 +126,14 @@ class _DefaultDict(_Made):
 
 
 class _Encoded(_Made):
-    """How old pickles write bytes: a text to be encoded as Latin-1, or nothing."""
+    # Old pickles write bytes as a text to encode as Latin-1, or nothing.
 
     def __new__(cls, text: str = "", _encoding: object = None) -> Any:
         return str.encode(text, "latin-1")
 
 
 class _Reconstructed(_Made):
-    """How old pickles make an object: its class, the base of its class, and the base's content."""
+    # Old pickles make an object from its class, the base of its class, and the base's content.
 
     def __new__(cls, made: Any, *base_and_content: Any) -> Any:
         return made(*(content for content in base_and_content[1:] if content is not None))
@@ -170,7 +170,6 @@ _ALLOWED: Final[dict[tuple[str, str], type]] = {
 
 class _Unpickler(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> type:
-        """The class of a name; raises `Rejected` for anything that is not data."""
         allowed = _ALLOWED.get((_ALIASES.get(module, module), name))
         if allowed is not None:
             return allowed
