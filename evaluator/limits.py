@@ -1,7 +1,6 @@
-"""The rights that a child process gives up before it reads untrusted bytes; then it writes `READY`.
+"""The rights that a child process gives up before it reads untrusted bytes; then it writes `READY`."""
 
-`limit` leaves signals, deletion of the user's files and faults of the kernel; `forbid_calls` removes these.
-"""
+# `limit` leaves signals, deletion of the user's files and faults of the kernel; `forbid_calls` removes these.
 
 import ctypes
 import resource
@@ -17,7 +16,7 @@ _PR_SET_DUMPABLE = 4
 
 
 def obey_the_parent_alone() -> None:
-    """End with the parent, and not by a signal to the whole service, for which a file would be blamed."""
+    # A signal to the whole service must not end this child: the file would be blamed.
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
     if sys.platform == "linux":

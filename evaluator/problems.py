@@ -1,7 +1,6 @@
-"""Problems of a file: `Problem`, and `Rejected`, which carries a list of them.
+"""Problems of a file: `Problem`, and `Rejected`, which carries a list of them."""
 
-A message states what, where, found and expected, equally on page, API and command line.
-"""
+# A message states what, where, found and expected, equally on page, API and command line.
 
 from __future__ import annotations
 
@@ -222,17 +221,11 @@ class Findings:
 
 
 def n_problems_in_words(n_problems: int, *, n_lines: int) -> str:
-    """Count the problems, and say why fewer lines follow.
-
-    >>> n_problems_in_words(1, n_lines=1), n_problems_in_words(7_000, n_lines=1)
-    ('1 problem', '7,000 problems; equal ones share a line')
-    """
     count = counted(n_problems, "problem")
     return f"{count}; equal ones share a line" if n_lines < n_problems else count
 
 
 def reject(code: str, message: str, where: str = "") -> Rejected:
-    """Make the rejection for one problem."""
     return Rejected([Problem(code, message, where)])
 
 
@@ -257,10 +250,6 @@ def pointer(*parts: str) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Join the first `MAX_LISTED` names.
-
-    >>> listed(["3", "7"])
-    '3, 7'
-    """
+    """Join the first `MAX_LISTED` names."""
     text = ", ".join(names[:MAX_LISTED])
     return text if len(names) <= MAX_LISTED else f"{text}, … (the first {MAX_LISTED})"

@@ -70,7 +70,6 @@ def decimal(value: float | None, *, decimals: int) -> str | None:
 
 
 def public_key(private_key: bytes) -> bytes:
-    """Return the public key of an Ed25519 seed."""
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey  # noqa: PLC0415 - slow to import
 
     return Ed25519PrivateKey.from_private_bytes(private_key).public_key().public_bytes_raw()
@@ -83,7 +82,6 @@ def key_id(public_key: bytes) -> str:
 
 
 def key_set(public_keys: list[bytes]) -> Document:
-    """Make the JSON Web Key Set of these keys."""
     shared = {"kty": "OKP", "crv": "Ed25519", "use": "sig", "alg": "EdDSA"}
     return {"keys": [shared | {"kid": key_id(key), "x": encode(key)} for key in public_keys]}
 

@@ -54,7 +54,6 @@ class _Program(ctypes.Structure):
 
 
 def why_unavailable() -> str | None:
-    """Explain why this system cannot filter calls, else None."""
     if sys.platform != "linux":
         return f"{sys.platform} has no seccomp"
     machine = os.uname().machine

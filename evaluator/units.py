@@ -75,10 +75,7 @@ class Units:
 
 
 def units_of(recordings: Sequence[str], *, given: Mapping[str, str], kind: str | None = None) -> Units:
-    """Return the units of recordings, by the rule or of `kind`; raises `ValueError` if they lack it.
-
-    `given` is the unit of every recording in the ground truth, or empty.
-    """
+    """Return the units of recordings, by the rule or of `kind`; raises `ValueError` if they lack it."""
     days = None if kind in {RECORDING, GIVEN} or (given and kind is None) else _days(recordings)
     if kind is None:
         kind = GIVEN if given else DAY if days and len(set(days)) >= MIN_DAYS else RECORDING

@@ -81,7 +81,6 @@ def _imported(command: str) -> click.Command:
 
 
 def own_commands() -> dict[str, click.Command]:
-    """Import the evaluator's own commands."""
     return {name: _imported(name) for name in COMMANDS}
 
 

@@ -188,7 +188,6 @@ def _confirm(name: str, visibility: str, foreseen: Foreseen) -> None:
 
 
 def _foreseen_in_words(foreseen: Foreseen) -> Iterator[str]:
-    """Describe the rows and the changed ranks that everyone would see."""
     from evaluator.cli.values import overall_of, texts_of  # noqa: PLC0415 -- others here need no scores
 
     yield printable(f"Everyone will see {foreseen.name}, team {foreseen.team}:")

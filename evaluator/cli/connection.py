@@ -78,7 +78,6 @@ def _splits_instead(client: Client, error: Refused) -> list[str]:
 
 
 def version() -> str:
-    """Return the installed version, 0 in a checkout."""
     import importlib.metadata  # noqa: PLC0415 -- costs more time than the rest of --help
 
     try:
@@ -88,7 +87,7 @@ def version() -> str:
 
 
 def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
-    """What happened, whose fault it is and what to do next; of a refusal `hint` says it."""
+    """Describe an error of the client and the next step; `hint` is the next step of a refusal."""
     from evaluator.client.answers import BadAnswer, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- loads msgspec
 
     refused_hint = hint
@@ -150,7 +149,7 @@ def exit_code_of(error: Refused) -> Exit:
 
 
 def _words_for(error: Refused) -> str:
-    """The message for an answer that is no problem document, such as a proxy's."""
+    # A proxy answers with no problem document.
     if error.status >= 500:
         return f"The server failed ({error.status}: {error.title}). This is not your fault."
     if error.status in {401, 403}:

@@ -14,7 +14,7 @@ from evaluator.problems import Problem, Rejected, n_problems_in_words
 
 
 class Failure(Exception):
-    """The end of a command: a message, the problems of the file, the next step, and `document` for --json."""
+    """The end of a command: message, problems of the file, next step, and `document` for --json."""
 
     def __init__(
         self,
@@ -70,5 +70,4 @@ def numbered(problems: Sequence[Problem]) -> Iterator[str]:
 
 
 def echo_json(document: object) -> None:
-    """Print one JSON document, floats at full precision."""
     click.echo(json.dumps(document, ensure_ascii=False, indent=2))

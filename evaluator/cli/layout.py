@@ -23,21 +23,12 @@ class Cell:
 
 
 def short_name(score: str) -> str:
-    """The paper's heading for a score's column.
-
-    >>> short_name("mid"), short_name("rte_crucial")
-    ('MiD', 'RTE_c')
-    """
     symbol, ttc_range = metric_of(score).symbol, split_name(score)[1]
     return symbol if ttc_range == OVERALL else f"{symbol}_{ttc_range[0]}"
 
 
 def units(scores: Iterable[str]) -> str:
-    """The units and TTC ranges of these scores' headings.
-
-    >>> units(["mid", "mid_crucial", "mid_negative", "rte"])
-    'MiD ×10⁻⁴, RTE %, lower is better; TTC ranges in s: c 0–3, n −20–0'
-    """
+    """Describe the units and TTC ranges of these scores."""
     groups = grouped_names(scores)
     ttc_ranges = dict.fromkeys(range_of(name) for names in groups.values() for name in names)
     ranges = ", ".join(f"{ttc_range.letter} {ttc_range.ends}" for ttc_range in ttc_ranges if ttc_range)

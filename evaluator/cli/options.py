@@ -92,7 +92,7 @@ def sendable(_context: click.Context, _parameter: click.Parameter, value: str | 
 
 
 def is_utf8(text: str) -> bool:
-    """Whether an argument or a file name was UTF-8: bytes that are not come as lone surrogates."""
+    # Arguments and file names have lone surrogates for other bytes.
     return not any("\ud800" <= character <= "\udfff" for character in text)
 
 

@@ -52,7 +52,7 @@ def bytes_of(path: Path) -> bytes:
 
 
 def predictions_of(path: Path) -> bytes:
-    """A prediction file, or standard input, as the leaderboard takes it: a Parquet table becomes JSON."""
+    """Read a prediction file or standard input; a Parquet table becomes JSON."""
     from evaluator.predictions import parquet  # noqa: PLC0415 -- few files need it
 
     with naming(path):

@@ -238,7 +238,7 @@ def _name_to_send(path: Path) -> str:
 
 
 def _announce(submission: Submission, *, site: str, err: bool) -> None:
-    """Name the submission before waiting, so that the user can continue after an interruption."""
+    # Before the wait: after an interruption the user can ask for this submission.
     address = f"  {urljoin(site, submission.url)}" if submission.url else ""
     click.echo(printable(f"Submission {submission.id}{address}"), err=err)
     if not submission.is_new:

@@ -98,7 +98,6 @@ def keep_token(url: str, token: str) -> str:
 
 
 def forget_token(url: str) -> bool:
-    """Remove the token from keyring and file; returns whether there was one."""
     from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
 
     if kept_token(url) is None:
@@ -181,5 +180,4 @@ def no_keyring(words: str) -> Failure:
 
 
 def account(url: str) -> str:
-    """Normalise a server's address to its name in the keyring."""
     return url.rstrip("/").lower()

@@ -19,16 +19,10 @@ def authors_or_team(entry: BoardEntry) -> str:
 
 
 def overall_of(names: Iterable[str]) -> list[str]:
-    """The overall scores among these, each once.
-
-    >>> overall_of(["mid", "mid_small", "rte", "mid"])
-    ['mid', 'rte']
-    """
     return [name for name in dict.fromkeys(names) if split_name(name)[1] == OVERALL]
 
 
 def texts_of(entry: BoardEntry, *, missing: str, scores: Sequence[str]) -> list[str]:
-    """Format scores as their edition publishes them, published rows as printed."""
     from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     decimals = entry.decimals

@@ -137,6 +137,7 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def score_names(self) -> tuple[str, ...]:
+        """The names of its scores, in the server's order."""
         return tuple(dict.fromkeys(name for entry in self.entries for name in entry.scores))
 
     @property

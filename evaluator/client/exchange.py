@@ -46,7 +46,6 @@ class RetryPolicy:
 
 
 def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
-    """Return a successful response; raises ClientError."""
     try:
         response = send()
     except (httpx.InvalidURL, UnicodeError) as error:  # a host that no name system could know
@@ -104,7 +103,6 @@ def _text(value: object) -> str:
 
 
 def decoded(response: httpx.Response) -> object:
-    """The JSON of an answer. Raises BadAnswer."""
     try:
         return msgspec.json.decode(response.content)
     except msgspec.DecodeError:

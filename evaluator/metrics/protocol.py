@@ -1,7 +1,6 @@
-"""Protocols: frozen, named rule sets that turn predictions into numbers, and the names of these numbers.
+"""Protocols: frozen, named rule sets that turn predictions into numbers, and the names of these numbers."""
 
-A changed rule gets a new protocol name. Code that shows an edition reads metrics and TTC ranges from here.
-"""
+# A changed rule gets a new protocol name. Code that shows an edition reads metrics and TTC ranges from here.
 
 from __future__ import annotations
 
@@ -32,6 +31,7 @@ class TTCRange:
 
     @property
     def letter(self) -> str:
+        """The subscript of its columns."""
         return self.name[0]
 
     @property
@@ -45,6 +45,7 @@ class TTCRange:
 
     @property
     def seconds(self) -> str:
+        """Both ends with their unit, such as "0–3 s"."""
         return f"{self.ends} s"
 
 
@@ -95,7 +96,6 @@ class Protocol:
     metrics: tuple[Metric, ...] = (MID, RTE)
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` for impossible names, and if the first metric is not MiD."""
         names = [*self.overall_names, *(ttc_range.name for ttc_range in self.ranges)]
         if not all(map(_NAME.fullmatch, names)) or len({*names, OVERALL}) <= len(names):
             raise ValueError(f"Names of metrics and TTC ranges are words, each once; found {names}.")
@@ -110,6 +110,7 @@ class Protocol:
 
     @cached_property
     def range_names(self) -> tuple[str, ...]:
+        """`overall`, then the TTC ranges in order."""
         return (OVERALL, *(ttc_range.name for ttc_range in self.ranges))
 
     @cached_property
@@ -123,10 +124,12 @@ class Protocol:
 
     @property
     def overall_names(self) -> tuple[str, ...]:
+        """The scores over all sequences, one for each metric."""
         return tuple(metric.name for metric in self.metrics)
 
     @property
     def decimals(self) -> int:
+        """The default number of decimals."""
         return max(metric.decimals for metric in self.metrics)
 
 
@@ -197,11 +200,7 @@ def known_names() -> tuple[str, ...]:
 
 
 def grouped_names(names: Iterable[str]) -> dict[Metric, list[str]]:
-    """Group the names of scores by metric, in the given order.
-
-    >>> {metric.symbol: names for metric, names in grouped_names(["mid", "mid_small", "rte"]).items()}
-    {'MiD': ['mid', 'mid_small'], 'RTE': ['rte']}
-    """
+    """Group the names of scores by metric, in the given order."""
     groups: dict[Metric, list[str]] = {}
     for name in names:
         groups.setdefault(metric_of(name), []).append(name)

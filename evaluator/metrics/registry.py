@@ -20,10 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """The input of a metric: float64 arrays of one shape, one item per sequence, predictions truncated.
-
-    `true_log_scale_ratio` is ln α₁₀(τ) by `scale.exact_log`.
-    """
+    """The input of a metric: float64 arrays of one shape; `true_log_scale_ratio` is ln α₁₀(τ)."""
 
     predicted_ttc_s: Floats
     true_ttc_s: Floats
@@ -66,11 +63,7 @@ class Metric:
 
     @property
     def heading(self) -> str:
-        """Symbol and unit for a column.
-
-        >>> MID.heading, RTE.heading
-        ('MiD ×10⁻⁴', 'RTE %')
-        """
+        """Symbol and unit, such as "RTE %"."""
         return f"{self.symbol} {self.unit}".rstrip()
 
     @property

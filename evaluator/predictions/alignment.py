@@ -57,8 +57,6 @@ def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
 
 
 def read_rates(document: Document, manifest: Manifest, findings: Findings) -> Floats:
-    """Read the pair rates in Hz, (n,) or ()."""
-
     def by_key(members: Members, pointer_of: PointerOf, fault: Fault) -> Floats:
         _check_keys(members, manifest, findings, pointer_of)
         return _column(members, manifest, findings, pointer_of, fault)

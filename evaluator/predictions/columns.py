@@ -82,7 +82,6 @@ def _rates(document: Document, manifest: Manifest) -> Floats:
 
 
 def _split(text: bytes) -> tuple[bytes, Document] | None:
-    """Split the object of predictions from the document around it."""
     if text[:1] != b"{" or text[-1:] != b"}":
         return None
     if text.find(b"{", 1) < 0:
@@ -111,10 +110,9 @@ def _split_envelope(text: bytes) -> tuple[bytes, Document] | None:
 
 
 class KeyWords(NamedTuple):
-    """The keys of a manifest as bytes of a file, `"123":`, at the end of 64-bit words; all (n,).
+    """The keys of a manifest as bytes of a file, `"123":`, at the end of 64-bit words; all (n,)."""
 
-    `masks` select these bytes, `lengths` count them; `row_of_number` is the row of each anno_id.
-    """
+    # `masks` select these bytes, `lengths` count them; `row_of_number` is the row of each anno_id.
 
     words: Words
     masks: Words
@@ -185,7 +183,7 @@ def _are_separated(buffer: bytearray, octets: NDArray[np.uint8], opens: Rows, *,
 
 
 def _numbers_in(words: Words) -> Words:
-    """Parse the digits before the last two bytes of words; words without digits give any number."""
+    # The digits before the last two bytes; words without digits give any number.
     other = (words ^ np.uint64(0x303030303030)) & np.uint64(0xF0F0F0F0F0F0)
     # The last byte that is no digit sets all bits before it.
     for n_bits in (1, 2, 4, 8, 16, 32):

@@ -1,7 +1,4 @@
-"""Strict reading of a prediction file: every member in order, every fault in words.
-
-It decides what a file means; `evaluator.predictions.columns` is a faster way to the same result.
-"""
+"""Strict reading of a prediction file, which decides what a file means: every fault in words."""
 
 from __future__ import annotations
 
@@ -62,11 +59,8 @@ class Document:
 
 
 def parse(data: bytes, *, max_members: int | None = None) -> object:
-    """Parse JSON with objects as `Members`; raises `Rejected` unless it is shallow UTF-8 JSON.
-
-    Refuses more than `max_members` members and items. Accepts a byte order mark, `NaN`, `Infinity` and
-    `-Infinity`; numbers beyond float64 become ±Infinity.
-    """
+    """Parse shallow UTF-8 JSON with objects as `Members`; raises `Rejected`, also for over `max_members`."""
+    # A byte order mark, `NaN` and ±`Infinity` are accepted; numbers beyond float64 become ±Infinity.
     body = data.removeprefix(BYTE_ORDER_MARK)
     try:
         text = body.decode("utf-8")

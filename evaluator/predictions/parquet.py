@@ -13,11 +13,7 @@ _MAGIC: Final = b"PAR1"
 
 
 def as_sent(data: bytes) -> bytes:
-    """Convert a Parquet table to a JSON prediction file, always the same bytes; other files stay.
-
-    Raises `Rejected` for a damaged table and columns other than keys and numbers, `ModuleNotFoundError`
-    without pyarrow.
-    """
+    """Convert a Parquet table to JSON, always the same bytes; other files stay. Raises `Rejected`."""
     if not data.startswith(_MAGIC):
         return data
     if find_spec("pyarrow") is None:

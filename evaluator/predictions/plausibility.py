@@ -129,11 +129,8 @@ _CAUSE: Final = (
 
 
 def roughness(manifest: Manifest, ttc_s: Floats) -> float | None:
-    """Compare neighbouring windows of one object with successive windows of two, by mean rank differences.
-
-    1 means that values are unrelated to their keys; smooth values give well below 1. None for few pairs or
-    equal values.
-    """
+    """Compare rank differences of neighbouring windows of one object with those of two objects."""
+    # 1 means that values are unrelated to their keys; smooth values give well below 1.
     same, other = _pairs(manifest)
     if min(len(same), len(other)) < MIN_PAIRS:
         return None

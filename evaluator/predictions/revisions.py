@@ -26,7 +26,6 @@ class Comparison:
 
 
 def compare(old: GroundTruth, new: GroundTruth) -> Comparison:
-    """Count the sequences that `new` adds, removes, changes and renumbers."""
     rows = rows_in(old.manifest, new.manifest)
     common = rows >= 0
     n_common = int(np.count_nonzero(common))

@@ -48,7 +48,6 @@ RULES: Final[dict[Unit, tuple[Rule, ...]]] = {
 
 
 def broken_rule(value: float, *, unit: Unit) -> Rule | None:
-    """Return the first rule that a value breaks, else None."""
     return next((rule for rule in RULES[unit] if not rule.holds(value)), None)
 
 

@@ -57,7 +57,6 @@ def scores_of(
     with_intervals: bool = False,
     unit: str | None = None,
 ) -> list[GroupScores]:
-    """Score groups of sequences, given as rows by name."""
     manifest, ttc_s, errors = details.truth.manifest, details.truth.ttc_s, details.errors
     masks = {OVERALL: np.ones(len(ttc_s), dtype=bool)}
     for ttc_range in details.protocol.ranges if has_ranges else ():

@@ -34,10 +34,7 @@ class Dependence:
 def dependence(
     sums: Floats, counts: Floats, units: Units, *, rng: np.random.Generator, n: int = N_PERMUTATIONS
 ) -> Dependence | None:
-    """Measure one column, by `sums` and `counts` (G,) of recordings and `n` permutations.
-
-    None if no unit has two recordings with sequences, or if recordings do not differ.
-    """
+    """Measure one column by `sums` and `counts` (G,) of recordings; None without units of two."""
     rests = sums - sums.sum() / counts.sum() * counts if counts.sum() else np.zeros_like(sums)
     square = float((rests**2).sum())
     orders = np.stack([np.arange(len(sums)), *(rng.permutation(len(sums)) for _ in range(n))], axis=1)

@@ -114,10 +114,7 @@ def difference(
     n_flips: int = N_SIGN_FLIPS,
     unit: str = RECORDING,
 ) -> dict[str, Difference]:
-    """Compare the sums of two entries over the same sequences, (G, columns) each, without rounding.
-
-    `names` are those of the columns, `unit` is the kind of the rows. A column without sequences is absent.
-    """
+    """Compare sums (G, columns) of two entries over the same sequences; empty columns are absent."""
     gaps, n, degrees = first - second, counts.sum(axis=0), degrees_of(counts)
     flips = sign_flips(gaps, counts, rng=signs, n_flips=n_flips)
     # With 8 degrees of freedom there are 8 units, and an end is missing after a few dozen flips alone.
@@ -187,11 +184,7 @@ def with_influence(
 
 
 def _first_false(holds: Callable[[int], bool], last: int) -> int:
-    """Find the first number up to `last` where `holds` turns false.
-
-    >>> _first_false(lambda n: n < 5, 9)
-    5
-    """
+    """Find the first number up to `last` where `holds` turns false."""
     holding, failing = 0, last
     while failing - holding > 1:
         middle = (holding + failing) // 2

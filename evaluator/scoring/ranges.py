@@ -43,10 +43,9 @@ _LOWER_END: Final = -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quoted:
-    """Rows printed in papers: `values` ± `half_widths` (rows, columns), NaN where absent.
+    """Rows of papers: `values` ± `half_widths` (rows, columns), NaN if absent; `counts` (G, columns)."""
 
-    h is 0.05 for one decimal. `counts` (G, columns) are the sequences of each recording.
-    """
+    # The half width of a value with one decimal is 0.05.
 
     values: Floats
     half_widths: Floats
@@ -165,7 +164,7 @@ def _count_significant(rows: _Rows, signs: Floats, between: Callable[[], None]) 
 
 
 def _measured(rows: _Rows, start: int) -> _Pairs:
-    """Pair some rows with all before them, by ΣD² = Q_aa + Q_bb − 2 Q_ab."""
+    # By ΣD² = Q_aa + Q_bb − 2 Q_ab.
     own = rows.sums[start : start + _ROWS]
     stop = start + len(own)
     nth, earlier = np.tril_indices(len(own), start - 1, stop)

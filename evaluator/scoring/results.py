@@ -21,10 +21,12 @@ class RangeScore:
 
     @property
     def mid(self) -> float | None:
+        """The mean motion-in-depth error."""
         return self.means["mid"]
 
     @property
     def rte(self) -> float | None:
+        """The mean relative TTC error."""
         return self.means["rte"]
 
     def as_dict(self) -> dict[str, float | int | None]:
@@ -35,10 +37,7 @@ class RangeScore:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordingSums:
-    """Sums of errors per recording ("bag") and their numbers of sequences, float64 (G, columns).
-
-    Rows follow `Manifest.recordings`, columns the protocol's `score_names`.
-    """
+    """Sums of errors and numbers of sequences per recording, float64 (recordings, score names)."""
 
     # For a hidden split they never leave the worker.
 

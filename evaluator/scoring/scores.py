@@ -88,7 +88,6 @@ class Scorer:
 
     @cached_property
     def recording_counts(self) -> Floats:
-        """Count sequences per recording and column."""
         n_bags = self._truth.manifest.n_recordings
         parts = [self._recordings[part] for part in self._slices.values()] * len(self._protocol.metrics)
         counts = np.stack([np.bincount(part, minlength=n_bags) for part in parts], axis=1)

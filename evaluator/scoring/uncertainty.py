@@ -87,7 +87,6 @@ class Bootstrap:
 
     @cached_property
     def _inverse_counts(self) -> Weights:
-        """1 / Σwn of the usable columns, (usable, B)."""
         weighted = self._counts.T.astype(np.float32) @ self._weights
         return np.asarray(1 / weighted[self.usable])
 

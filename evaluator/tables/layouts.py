@@ -18,8 +18,6 @@ ABSENT: Final = "–"
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A printed value, with its 95 % interval as two texts if known."""
-
     text: str
     low: str = ""
     high: str = ""
@@ -56,11 +54,9 @@ class Origin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Export:
-    """A board for the export formats; each reads the rows once.
+    """A board for the export formats: `rows` of a table, all `records` by `columns`, BibTeX `references`."""
 
-    `rows` are those of a table, without withdrawn ones; `records` all rows by `columns`, with published
-    numbers or None; `references` the BibTeX entries of papers.
-    """
+    # `rows` leave out withdrawn entries; `records` have published numbers or None.
 
     origin: Origin
     rows: Iterable[Row]
@@ -95,7 +91,6 @@ def about(origin: Origin) -> tuple[str, ...]:
 
 
 def mark_of(*, visibility: str, pseudonym: str | None) -> str:
-    """Mark an own row that others do not see as it is."""
     return "private" if visibility == "PRIVATE" else "anonymous" if pseudonym else ""
 
 
@@ -187,11 +182,6 @@ def _latex_cell(cell: Cell) -> str:
 
 
 def _latex_unit(unit: str) -> str:
-    r"""Format a unit for LaTeX.
-
-    >>> print(_latex_unit("×10⁻⁴"), _latex_unit("%"))
-    $\times 10^{-4}$ \%
-    """
     if not unit.startswith("×10"):
         return latex(unit)
     return rf"$\times 10^{{{unicodedata.normalize('NFKC', unit[3:]).replace('−', '-')}}}$"

@@ -230,7 +230,6 @@ def as_json(shown: PrintedTable) -> str:
 
 
 def document(shown: PrintedTable) -> dict[str, Any]:
-    """Return one table as plain data, for API and `--json`."""
     table = shown.table
     return {
         "name": table.name,

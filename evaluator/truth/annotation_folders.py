@@ -123,7 +123,6 @@ def _read_here(
 def _read_apart(
     folder: Path, files: Sequence[Path], *, with_ttc: bool, with_boxes: bool, with_frames: bool
 ) -> AnnotatedFiles:
-    """Read the files in a child process, one after the other."""
     sizes = [min(path.stat().st_size, MAX_FILE_BYTES) for path in files]
     memory_bytes = _BASE_BYTES + _BYTES_PER_BYTE * max(sizes)
     cpu_s = _BASE_CPU_S + sum(sizes) // _BYTES_PER_CPU_S
@@ -205,7 +204,6 @@ def _last_words(child: subprocess.Popen[bytes]) -> str:
 
 
 def _end_of(child: subprocess.Popen[bytes], *, memory_bytes: int) -> tuple[str, str]:
-    """Explain the end of the child, as code and message."""
     import signal  # noqa: PLC0415 -- as READY
 
     from evaluator.limits import EXIT_OUT_OF_MEMORY  # noqa: PLC0415 -- as READY

@@ -52,10 +52,7 @@ def read_files(
     with_boxes: bool = False,
     with_frames: bool = False,
 ) -> AnnotatedFiles:
-    """Read the sequences of annotation files, by name and content; options as in `read_annotations`.
-
-    Raises `Rejected` for malicious or malformed pickles.
-    """
+    """Read the sequences of annotation files, by name and content, as `read_annotations` does."""
     table, findings, locations, n_sequences = Table(), Findings(), list[str](), list[int]()
     boxes, frame_ttc_s = list[list[float]](), list[list[float]]()
     for name, data in files:

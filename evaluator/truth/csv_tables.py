@@ -92,10 +92,8 @@ class Table:
         return list(map(",".join, zip(*(values[name] for name in columns), strict=True)))
 
     def digests(self) -> tuple[str, str]:
-        """Compute `sha256:…` of the manifest's text and of the whole table's, in ascending anno_id.
-
-        The second is empty without times to contact. A missing column `unit` does not change a digest.
-        """
+        """Compute `sha256:…` of the manifest's text and of the whole table's, "" without times to contact."""
+        # In ascending anno_id. A missing column `unit` does not change a digest.
         columns = self.manifest_columns
         lines = self._lines(columns)
         whole = list(map(",".join, zip(lines, map(repr, self.ttc_s), strict=True))) if self.ttc_s else []
@@ -131,7 +129,6 @@ def name_fault(text: str) -> str | None:
 
 
 def read_text(source: Source) -> str:
-    """Read UTF-8 text, with or without a byte order mark. Raises `Rejected`."""
     try:
         return data_of(source).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -140,10 +137,8 @@ def read_text(source: Source) -> str:
 
 
 def read_csv(source: Source, *, with_ttc: bool) -> Table:
-    """Read `COLUMNS` and `unit`, with `with_ttc` also `OBJECT_COLUMNS`, from a CSV file with a header.
-
-    Raises `Rejected`, by line, for an unreadable file, missing columns and malformed fields.
-    """
+    """Read a CSV table; raises `Rejected`, by line, for missing columns and malformed fields."""
+    # `COLUMNS` and `unit`, for a ground truth also `OBJECT_COLUMNS`; other columns are ignored.
     text = read_text(source)
     columns = COLUMNS if with_ttc else MANIFEST_COLUMNS
     rows = csv.reader(io.StringIO(text, newline=""), strict=True)

@@ -83,6 +83,7 @@ class Manifest:
 
     @property
     def n_sequences(self) -> int:
+        """Number of sequences."""
         return len(self.anno_id)
 
     @cached_property
@@ -94,6 +95,7 @@ class Manifest:
 
     @cached_property
     def anno_id_keys(self) -> tuple[str, ...]:
+        """The anno_ids as keys of a prediction file."""
         return tuple(map(str, self.anno_id.tolist()))
 
     @cached_property
@@ -110,6 +112,7 @@ class Manifest:
 
     @cached_property
     def row_of_natural_key(self) -> dict[str, int]:
+        """The row of every natural key."""
         return {key: row for row, key in enumerate(self.natural_keys)}
 
     @cached_property
@@ -210,6 +213,7 @@ class GroundTruth:
 
     @property
     def n_sequences(self) -> int:
+        """Number of sequences."""
         return self.manifest.n_sequences
 
     @cached_property
@@ -219,6 +223,7 @@ class GroundTruth:
 
     @cached_property
     def ascending_ttc_s(self) -> Floats:
+        """τ in ascending order."""
         return self.ttc_s[self.ascending_rows]
 
     @cached_property

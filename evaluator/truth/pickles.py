@@ -24,10 +24,8 @@ _NUMERIC: Final = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|c8|c16)")
 
 
 def load_plain(data: bytes, *, where: str) -> object:
-    """Load a pickle of plain data; raises `Rejected` at `where` for anything else, and MemoryError.
-
-    Attribute-dicts become `Attributes`, numpy scalars Python numbers, other dicts dicts, arrays `FewNumbers`.
-    """
+    """Load a pickle of plain data; raises `Rejected` at `where` for anything else, and MemoryError."""
+    # Attribute-dicts become `Attributes`, numpy scalars numbers, other dicts dicts, arrays `FewNumbers`.
     try:
         # A buffered reader can be peeked into, so that the unpickler does not ask for each few bytes.
         return _Unpickler(io.BufferedReader(io.BytesIO(data)), encoding="latin-1").load()
