@@ -26,8 +26,7 @@ def read_boxes(path: Path, *, manifest: Manifest) -> tuple[NDArray[np.float64], 
 
     Raises `Rejected`, by line, for a malformed table, duplicate boxes, unknown sequences or the wrong unit.
     """
-    # With whether they are normalised: a line `#unit=normalised` before the header means parts of the image's
-    # size.
+    # Normalised: a line `#unit=normalised` before the header means parts of the image's size, 0…1.
     lines, is_normalised = _lines(path)
     boxes = np.full((manifest.n_sequences, N_FRAMES, 4), np.nan)
     line_of: dict[tuple[int, int], int] = {}

@@ -217,7 +217,7 @@ class ClientError(Exception):
 
 @dataclass(kw_only=True, eq=False)
 class Unreachable(ClientError):
-    """No whole answer came: nothing listens, the name is unknown, the connection broke, time ran out."""
+    """An incomplete answer: nothing listens, the name is unknown, the connection broke, time ran out."""
 
     url: str
     reason: str
@@ -259,7 +259,7 @@ class BadAnswer(ClientError):
 
 @dataclass(kw_only=True, eq=False)
 class TimedOut(ClientError):
-    """The workers did not finish in time; `submission` is the last known state."""
+    """The end of a wait for the workers; `submission` is the last known state."""
 
     what: str
     timeout_s: float

@@ -59,7 +59,7 @@ def _certificates(url: str) -> ssl.SSLContext | bool:
 
 @dataclass(kw_only=True)
 class Client:
-    """A connection to one leaderboard. `timeout_s` bounds each wait for the network, not the whole."""
+    """A connection to one leaderboard; `timeout_s` limits each wait for the network."""
 
     url: str
     token: str | None = field(default=None, repr=False)

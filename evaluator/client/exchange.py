@@ -31,7 +31,7 @@ class RetryPolicy:
     jitter: float = 0.2
 
     def delay_s(self, *, n_failed: int, retry_after_s: float | None, rng: random.Random) -> float:
-        """Seconds to wait after `n_failed` tries (from 1); never less than the server asked for."""
+        """Return the seconds to wait after `n_failed` tries (from 1), at least those of the server."""
         grown = min(self.longest_delay_s, self.first_delay_s * self.factor ** (n_failed - 1))
         return max(grown * (1 - self.jitter * rng.random()), retry_after_s or 0.0)
 

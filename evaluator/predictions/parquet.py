@@ -13,7 +13,10 @@ _MAGIC: Final = b"PAR1"
 
 
 def as_sent(data: bytes) -> bytes:
-    """Convert a Parquet table to JSON, always the same bytes; other files stay. Raises `Rejected`."""
+    """Convert a Parquet table to JSON, always the same bytes; other files stay.
+
+    Raises `Rejected` for a damaged table or other columns, `ModuleNotFoundError` without pyarrow.
+    """
     if not data.startswith(_MAGIC):
         return data
     if find_spec("pyarrow") is None:

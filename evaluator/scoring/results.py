@@ -14,7 +14,7 @@ from evaluator.truth.ground_truth import GroundTruth
 
 @dataclass(frozen=True, slots=True)
 class RangeScore:
-    """Mean errors over one TTC range, by metric; None without sequences."""
+    """Mean errors over one TTC range, by metric; values are None without sequences."""
 
     means: Mapping[str, float | None]
     count: int

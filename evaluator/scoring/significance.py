@@ -77,7 +77,7 @@ class Difference:
 
     @property
     def resolution(self) -> float | None:
-        """The same whether significant or not: the resolution of the recordings."""
+        """The detectable difference also where it is significant: the resolution of the recordings."""
         if self.low is None or self.high is None:
             return None
         return _DETECTABLE * (self.high - self.low) / 2

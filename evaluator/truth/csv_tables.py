@@ -92,7 +92,7 @@ class Table:
         return list(map(",".join, zip(*(values[name] for name in columns), strict=True)))
 
     def digests(self) -> tuple[str, str]:
-        """Compute `sha256:…` of the manifest's text and of the whole table's, "" without times to contact."""
+        """Compute `sha256:…` of the manifest's text and of the whole table's (empty without times)."""
         # In ascending anno_id. A missing column `unit` does not change a digest.
         columns = self.manifest_columns
         lines = self._lines(columns)
@@ -148,10 +148,6 @@ def read_csv(source: Source, *, with_ttc: bool) -> Table:
         raise reject("bad-csv", f"This is not a CSV table: {error}.", f"line {rows.line_num}") from None
 
 
-def _of_objects(header: list[str], columns: tuple[str, ...]) -> dict[str, int]:
-    return {name: header.index(name) for name in OBJECT_COLUMNS if name in header and "ttc" in columns}
-
-
 def _read_rows(rows: Any, columns: tuple[str, ...]) -> Table:
     header = [name.strip() for name in next(rows, [])]
     missing = [name for name in columns if name not in header]
@@ -164,7 +160,7 @@ def _read_rows(rows: Any, columns: tuple[str, ...]) -> Table:
         )
     columns = (*columns, UNIT) if UNIT in header else columns
     positions = {name: header.index(name) for name in columns}
-    extra = _of_objects(header, columns)
+    extra = {name: header.index(name) for name in OBJECT_COLUMNS if name in header and "ttc" in columns}
     table, findings, locations = Table(), Findings(), []
     for row in rows:
         if not row:
