@@ -110,7 +110,10 @@ def grid_about(centre: float, *, n_cells: int, cell_px: ArrayLike) -> Floats:
 
 
 def boxes_of_pair(clip: Clip, *, frame_gap: int) -> tuple[Floats, Floats]:
-    """Return the boxes (4,) of reference and target; raises `ValueError` for the gap, and `Unusable`."""
+    """Return the boxes (4,) of reference and target.
+
+    Raises `ValueError` for a gap outside of 1 … 5, `Unusable` for a missing or too small box.
+    """
     if not 1 <= frame_gap <= TARGET:
         raise ValueError(f"The frame gap is {frame_gap}; expected 1 to {TARGET}.")
     reference, target = clip.boxes[TARGET - frame_gap], clip.boxes[TARGET]

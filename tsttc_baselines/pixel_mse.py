@@ -78,7 +78,7 @@ class PixelMse:
     search: Search = "full"
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
-        """Estimate α; raises `Unusable` for a missing, too small, outside or untextured box."""
+        """Estimate α; raises `Unusable` for a box that is missing, too small, outside or without texture."""
         match = self.match(clip, frame_gap=frame_gap)
         return Estimate(match.scale_ratio, confidence=match.confidence)
 
@@ -183,7 +183,7 @@ class Comparison:
         )
 
     def errors(self, scales: Floats, *, max_shift: int) -> Floats:
-        """Compute squared errors (n, 2c + 1, 2c + 1) of scales at shifts −c … c, y before x."""
+        """Compute mean squared errors (n, 2c + 1, 2c + 1) of scales at shifts −c … c, y before x."""
         errors = self._errors(scales, max_shift, np.float32)
         # In float32 they are true to 1.5e-6 of the variance; where the match is so good that this shows, the
         # few scales are done again.

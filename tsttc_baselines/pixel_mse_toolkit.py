@@ -1,9 +1,10 @@
 """Pixel MSE as the dataset's toolkit computes it, written from a description of its behaviour.
 
-It resamples the target frame, by the nearest pixel, and compares it with a patch of the reference frame of
-fixed size. Its reference crop begins at the top left of the reference box's surroundings but has the target's
-size, so its centre is off by s (1 − α)(0.769 − 0.5/α) for an object of size s. Crops over 128 px are shrunk.
-A softmax of normalised scores weighs the best bins nearly equally.
+It differs from the paper in four ways. It resamples the target frame, by the nearest pixel, and compares it
+with a patch of the reference frame of fixed size. Its reference crop begins at the top left of the reference
+box's surroundings but has the target's size, and its patch begins where the target's does: the centre is off
+by s (1 − α)(0.769 − 0.5/α) for an object of size s, which matters for α > 1. Crops over 128 px are shrunk. A
+softmax of normalised scores weighs the best bins nearly equally.
 """
 
 # The toolkit drops sequences near the image's edge; here the border is repeated.

@@ -5,8 +5,8 @@ standstill, contact, a finished lane change) is the root of a line or a parabola
 exact.
 
 Not in the paper: whether a triple (a, b, s) includes b (`closed`); a lane is 3.75 m wide; a run ends at
-contact (scripts 5 and 6: at 5 m), after a lane change, or when the gap would grow; a braking vehicle stops;
-script 3 has one distance.
+contact (scripts 5 and 6: at 5 m), after a lane change, or at equal speeds if the gap would grow; a braking
+vehicle stops; the two distances of script 3 are one.
 """
 
 from __future__ import annotations

@@ -97,8 +97,8 @@ def median_flow(frames: list[Image], *, box: Box) -> tuple[Box, float]:
 
     Raises `Unusable` for too few points.
     """
-    # In each step the box grows by the median ratio of the points' distances; its centre moves by their
-    # median.
+    # In each step the box grows by the median ratio of the points' distances. Each point then predicts the
+    # centre, and the median counts.
     confidence = 1.0
     for before, after in pairwise(frames):
         starts, ends = _followed(before, after, box)

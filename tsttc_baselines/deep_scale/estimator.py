@@ -56,7 +56,7 @@ class DeepScale:
         self._operations = operations_on(device, loaded)
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
-        """Estimate α; raises `Unusable` for a missing, too small or outside box."""
+        """Estimate α; raises `Unusable` for a box that is missing, too small or centred outside the image."""
         frames, boxes = _usable(clip, frame_gap=frame_gap)
         confidences = self.confidences(cut(frames, boxes, use=self._use))
         best = best_of(-confidences, n_top=N_TOP)

@@ -1,7 +1,8 @@
 """The estimate from a fit: the reference frame is cut again until its features match the target's.
 
-The head knows 20 scale ratios, 4.5 % apart; here scale ratio and shift are continuous. Both frames are cut on
-one grid. Features F of both crops give a Gauss-Newton step
+The head knows 20 scale ratios, 4.5 % apart, and whole cells; here scale ratio and shift are continuous. The
+target's box and the reference, moved and scaled by the present estimate, are cut on one grid. Their features
+F give a Gauss-Newton step
 
     F_target(u) − F_reference(u)  ≈  (δ · u + s) · ∇F(u)
 

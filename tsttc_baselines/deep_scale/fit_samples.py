@@ -31,7 +31,7 @@ near, as in the last steps of a fit.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FitSample:
-    """Pixels (2, 3, rows, columns) of target and reference on `grid`, and the reference's error in ln α."""
+    """Pixels (2, 3, rows, columns) of target and reference; `lacking` is missing in the reference's ln α."""
 
     pixels: Pixels
     grid: Grid

@@ -62,8 +62,8 @@ class Use:
     """How weights are used; the defaults are the toolkit's.
 
     `similarity` is "cosine" in the paper, "dot" for the toolkit's weights. `n_cells` is the paper's target
-    size. Frames are shrunk until the target's box has `max_box_px`; crops have `margin_px` around. `decoding`
-    is as in `DeepScale`.
+    size. Frames are shrunk until the target's box has at most `max_box_px` on its longer side; crops have
+    `margin_px` around. `decoding` is as in `DeepScale`.
     """
 
     similarity: Similarity = "dot"
