@@ -127,14 +127,13 @@ class Bootstrap:
 def _tail(n_effective: float, *, degrees: float) -> float:
     """Compute the share of resamples beyond either end of a 95 % interval of `n_effective` equal units.
 
-    Φ(−t(97.5 %) · √(n / (n − 1))), the expanded percentiles of Hesterberg (The American Statistician 69,
-    2015), with Student's t. Both numbers are at least 3.
-
     >>> round(_tail(1e9, degrees=1e9), 4), round(_tail(100.0, degrees=99.0), 4)
     (0.025, 0.0231)
     >>> round(_tail(20.0, degrees=10.0), 4)
     0.0111
     """
+    # Φ(−t(97.5 %) · √(n / (n − 1))), the expanded percentiles of Hesterberg (The American Statistician 69,
+    # 2015), with Student's t. Below 8 degrees there is no interval, so both numbers are at least 3 here.
     n = max(n_effective, 3.0)
     return NormalDist().cdf(-_student(max(degrees, 3.0)) * (n / (n - 1)) ** 0.5)
 
