@@ -4,7 +4,7 @@
     predictions = read_predictions("mine.json", manifest=truth.manifest)
     print(evaluate(predictions, truth))
 
-Arithmetic about files: no network, no clock, no global state.
+It needs no network, clock or global state.
 """
 
 from importlib import import_module
@@ -50,7 +50,6 @@ else:
     _HOME_OF = {name: f"evaluator.{module}" for module, names in _HOMES.items() for name in names}
 
     def __getattr__(name: str) -> object:
-        """A public name, from the module that defines it."""
         if name not in _HOME_OF:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         value = globals()[name] = getattr(import_module(_HOME_OF[name]), name)

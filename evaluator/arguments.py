@@ -21,7 +21,7 @@ _HINTS: Final = {
 
 
 def data_of(source: Source) -> bytes:
-    """The bytes of a file. Raises `Rejected` where it cannot be read, `TypeError` for what is no file."""
+    """Read the bytes of a file; raises `Rejected` if it is unreadable, `TypeError` for other objects."""
     if isinstance(source, bytes):
         return source
     if isinstance(source, bytearray | memoryview):

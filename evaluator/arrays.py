@@ -1,7 +1,4 @@
-"""Numbers as callers have them: arrays, lists, tensors of torch, Series of pandas.
-
-Neither torch nor pandas is imported: what a value can do says what it is.
-"""
+"""Numbers from arrays, lists, tensors of torch and Series of pandas, recognised without imports."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ Floats = NDArray[np.float64]
 
 
 def as_floats(values: Any) -> Floats:
-    """The numbers as float64, of the same shape; a tensor may have bfloat16, a gradient and any device."""
+    """Convert to float64 of the same shape; a tensor may have bfloat16, a gradient and any device."""
     if hasattr(values, "detach"):
         values = values.detach().cpu().double()  # on the CPU first: not every device has float64
     elif isinstance(values, list | tuple) and values and hasattr(values[0], "detach"):
@@ -24,10 +21,10 @@ def as_floats(values: Any) -> Floats:
 
 
 def in_row_order(values: Any, *, name: str, anno_id: NDArray[np.int64] | None) -> Floats:
-    """A copy of one number per sequence, in the order of `anno_id`, the manifest's; None for any order.
+    """Copy one number per sequence, in the order of `anno_id` (the manifest's; None: any order).
 
-    A Series of pandas must have the index 0, 1, 2, … or these anno_ids. Raises `TypeError` for a dict,
-    `ValueError` for a Series in another order.
+    Raises `TypeError` for a dict, `ValueError` for a Series whose index is neither 0, 1, 2, … nor these
+    anno_ids.
     """
     if isinstance(values, Mapping):
         raise TypeError(

@@ -13,7 +13,7 @@ from evaluator.truth.ground_truth import Manifest
 
 
 def manifest_frame(manifest: Manifest) -> pd.DataFrame:
-    """The manifest as a frame of n rows, indexed by anno_id: what to join one's own results to."""
+    """Return the manifest as a frame of n rows, indexed by anno_id, to join results to."""
     return pd.DataFrame(
         {
             "bag_stamp": manifest.bag_stamp,
@@ -26,11 +26,10 @@ def manifest_frame(manifest: Manifest) -> pd.DataFrame:
 
 
 def predictions_from_frame(frame: pd.DataFrame, *, manifest: Manifest, column: str = "ttc_s") -> Predictions:
-    """Predictions from a frame with one row per sequence, in any order: seconds in `column`.
+    """Read predictions from a frame with one row per sequence, in any order: seconds in `column`.
 
-    A sequence is named by the columns `bag_stamp`, `cam_id`, `ts` and `track_id`, its natural key; else by
-    `anno_id`, a column or the name of the index. Raises `Rejected` in the words that a file with these values
-    would get, `ValueError` for a frame that names no sequences, `KeyError` for a column that is not there.
+    Keys are the columns `bag_stamp`, `cam_id`, `ts` and `track_id`, else `anno_id` (a column or the index).
+    Raises `Rejected` as for a file, `ValueError` for a frame without keys, `KeyError` for a missing column.
     """
     require(frame, pd.DataFrame, name="frame")
     if column not in frame.columns:

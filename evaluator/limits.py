@@ -1,10 +1,6 @@
-"""The rights that a child process gives up before it reads untrusted bytes.
+"""The rights that a child process gives up before it reads untrusted bytes; then it writes `READY`."""
 
-It writes `READY` when that is done: a child that ends before has seen nothing of what it was to read.
-
-`limit` alone leaves to whoever takes the child over to signal and to unlink what its user may, and any fault
-of the kernel; `forbid_calls` takes these away where the kernel filters calls.
-"""
+# `limit` leaves signals, deletion of the user's files and faults of the kernel; `forbid_calls` removes these.
 
 import ctypes
 import resource
@@ -20,7 +16,7 @@ _PR_SET_DUMPABLE = 4
 
 
 def obey_the_parent_alone() -> None:
-    """End with the parent, and not by a signal to the whole service, for which a file would be blamed."""
+    # A signal to the whole service must not end this child: the file would be blamed.
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
     if sys.platform == "linux":
@@ -28,16 +24,13 @@ def obey_the_parent_alone() -> None:
 
 
 def keep_memory_private() -> None:
-    """Refuse other processes of this user this one's memory, environment and descriptors.
-
-    Debuggers and profilers as well, and the kernel writes no core. Processes that are forked inherit it.
-    """
+    """Hide memory, environment and descriptors from debuggers and core dumps; forks inherit it."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
 
 
 def limit(*, memory_bytes: int, cpu_s: int) -> None:
-    """Give up what parsing does not need. Irrevocable for this process, unless it is root's."""
+    """Give up what parsing does not need; irrevocable except for root."""
     keep_memory_private()
     resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
     resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 1))
@@ -49,9 +42,6 @@ def limit(*, memory_bytes: int, cpu_s: int) -> None:
 
 
 def forbid_calls() -> None:
-    """Allow only the system calls that reading needs, where the kernel can do that. Irrevocable.
-
-    Raises `OSError` if the kernel takes no filter after all.
-    """
+    """Allow only system calls that reading needs, if the kernel can; irrevocable. Raises `OSError`."""
     if system_calls.why_unavailable() is None:
         system_calls.allow_only_reading()

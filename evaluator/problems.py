@@ -1,8 +1,6 @@
-"""Problems of a file: `Problem`, and `Rejected`, which carries the list.
+"""Problems of a file: `Problem`, and `Rejected`, which carries a list of them."""
 
-A problem says what, where, found and expected in one sentence, in the same words on the page, in the API and
-on the command line. Its code is stable and made for programs; `PROBLEM_CODES` is the whole vocabulary.
-"""
+# A message states what, where, found and expected, equally on page, API and command line.
 
 from __future__ import annotations
 
@@ -75,7 +73,8 @@ PROBLEM_CODES: Final[dict[str, str]] = {
 class Problem:
     """One fault of a file.
 
-    `where` is a JSON pointer (`/predictions/12`), a position (`line 3, column 8`), a file name, or "".
+    `code` is one of `PROBLEM_CODES`; `where` a JSON pointer (`/predictions/12`), a position (`line 3, column
+    8`), a file name, or "".
     """
 
     code: str
@@ -88,7 +87,7 @@ class Problem:
 
 @dataclass(frozen=True, slots=True)
 class FileWarning:
-    """Something that is probably wrong with a file, which is scored all the same."""
+    """A probable mistake in a file that is scored nevertheless."""
 
     code: str
     message: str
@@ -106,7 +105,7 @@ WARNING_CODES: Final[dict[str, str]] = {
 
 
 class Rejected(Exception):
-    """The file is at fault. `problems` lists why; `n_problems` also counts the faults that are not listed."""
+    """The refusal of a faulty file: its `problems`, and `n_problems` with those that are not listed."""
 
     def __init__(self, problems: Iterable[Problem], *, n_problems: int | None = None) -> None:
         self.problems: tuple[Problem, ...] = tuple(problems)
@@ -122,16 +121,12 @@ class Rejected(Exception):
         return "\n".join([f"{title}:", *(f"  {number}. {p}" for number, p in enumerate(self.problems, 1))])
 
     def as_dict(self) -> dict[str, object]:
-        """`{"n_problems": …, "problems": [{"code", "message", "where"}, …]}`."""
+        """Return `{"n_problems": …, "problems": [{"code", "message", "where"}, …]}`."""
         return {"n_problems": self.n_problems, "problems": [asdict(problem) for problem in self.problems]}
 
     @classmethod
     def from_dict(cls, given: Mapping[str, object]) -> Rejected:
-        """The rejection that `as_dict` has written, by a process that is not trusted.
-
-        Raises `ValueError` for what `as_dict` never writes: another form, more lines or longer texts than a
-        reader makes, or a code that there is not.
-        """
+        """Read what `as_dict` wrote in an untrusted process; raises `ValueError` for anything else."""
         n_problems, lines = given.get("n_problems"), given.get("problems")
         if type(n_problems) is not int or not 0 < n_problems <= _MAX_COUNTED:
             raise ValueError("it has no number of problems")
@@ -140,7 +135,7 @@ class Rejected(Exception):
         return cls(map(_problem, lines), n_problems=n_problems)
 
     def to_json(self) -> str:
-        """The text of `as_dict()`."""
+        """Return `as_dict()` as JSON."""
         return json.dumps(self.as_dict(), ensure_ascii=False)
 
 
@@ -163,14 +158,11 @@ def _restored(problems: tuple[Problem, ...], n_problems: int) -> Rejected:
 
 @dataclass(slots=True)
 class _Line:
-    """A problem with the further places where it was found: their number, and the first of them."""
-
     problem: Problem
     n_more: int = 0
     more: list[str] = field(default_factory=list)
 
     def add(self, where: str) -> None:
-        """Note a further place; a place may have several faults of a kind, one after the other."""
         if where == (self.more[-1] if self.more else self.problem.where):
             return
         self.n_more += 1
@@ -187,7 +179,7 @@ class _Line:
 
 
 class Findings:
-    """Collects problems while a file is read, so that one answer names them all, equal ones in one line."""
+    """A collector of problems while a file is read: one answer names them all."""
 
     def __init__(self) -> None:
         self._lines: list[_Line] = []
@@ -198,10 +190,7 @@ class Findings:
         self._n_grouped = 0
 
     def add(self, code: str, message: str, where: str = "") -> None:
-        """Note one fault; the first `MAX_LISTED` lines of a kind are kept, all faults are counted.
-
-        A message that was noted before adds its place to that line.
-        """
+        """Note one fault; equal messages share a line, and at most `MAX_LISTED` lines of a kind are kept."""
         self._counts[code] += 1
         line = self._line_of.get((code, message)) if where else None
         if line:
@@ -215,12 +204,11 @@ class Findings:
             self._n_unlisted[code] += 1
 
     def group(self, code: str, message: str, where: str = "", *, n_faults: int) -> None:
-        """Note many faults of one kind as a single problem, whose message gives count and examples."""
+        """Note many faults of one kind as one problem with count and examples."""
         self._lines.append(_Line(Problem(code, message, where)))
         self._n_grouped += n_faults
 
     def raise_if_any(self) -> None:
-        """Raise `Rejected` when anything was noted."""
         if not self._lines:
             return
         rest = [
@@ -233,22 +221,16 @@ class Findings:
 
 
 def n_problems_in_words(n_problems: int, *, n_lines: int) -> str:
-    """The number of problems, and why the list below has fewer lines.
-
-    >>> n_problems_in_words(1, n_lines=1), n_problems_in_words(7_000, n_lines=1)
-    ('1 problem', '7,000 problems; equal ones share a line')
-    """
     count = counted(n_problems, "problem")
     return f"{count}; equal ones share a line" if n_lines < n_problems else count
 
 
 def reject(code: str, message: str, where: str = "") -> Rejected:
-    """The rejection for a single problem, to be raised."""
     return Rejected([Problem(code, message, where)])
 
 
 def quoted(text: str) -> str:
-    """`text` for a message: in quotes, escaped to printable ASCII, shortened.
+    """Quote `text` for a message: printable ASCII, shortened.
 
     >>> print(quoted("a\\x00\\ud800b"))
     "a\\u0000\\ud800b"
@@ -258,7 +240,7 @@ def quoted(text: str) -> str:
 
 
 def pointer(*parts: str) -> str:
-    """A JSON pointer (RFC 6901) to the member named by `parts`, in printable ASCII.
+    """Return the JSON pointer (RFC 6901) to the member named by `parts`, in printable ASCII.
 
     >>> pointer("predictions", "0007/1/500/3")
     '/predictions/0007~11~1500~13'
@@ -268,10 +250,6 @@ def pointer(*parts: str) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """The first `MAX_LISTED` names, for a message.
-
-    >>> listed(["3", "7"])
-    '3, 7'
-    """
+    """Join the first `MAX_LISTED` names."""
     text = ", ".join(names[:MAX_LISTED])
     return text if len(names) <= MAX_LISTED else f"{text}, … (the first {MAX_LISTED})"

@@ -1,10 +1,10 @@
-"""Score receipts: JSON Web Tokens (RFC 7519) signed by EdDSA, for anybody to check offline.
-
-Scores are decimal texts with the edition's decimals (`"15.03"`): programs print numbers differently. The
-keys are a JSON Web Key Set (RFC 7517, RFC 8037), each named by its RFC 7638 thumbprint.
+"""Score receipts: JSON Web Tokens (RFC 7519) signed by EdDSA, checked offline.
 
     verified = verify(receipt_bytes, read_keys(keys_bytes))    # raises NotVerified
     verified.scores["mid"], verified.edition, verified.site
+
+Scores are decimal texts with the edition's decimals (`"15.03"`). The keys are a JSON Web Key Set (RFC 7517,
+RFC 8037), each named by its RFC 7638 thumbprint.
 """
 
 from __future__ import annotations
@@ -31,11 +31,10 @@ Document = dict[str, Any]
 
 
 class NotVerified(Exception):
-    """The receipt says nothing that one may rely on. `code` is stable; the text says what, found, expected.
+    """A receipt that proves nothing; `code` is stable.
 
-    `receipt-malformed`: no receipt. `receipt-version`: of a newer form. `receipt-keys`: the key set cannot be
-    read. `receipt-key-unknown`: signed by none of these keys. `receipt-altered`: the signature does not fit
-    what the receipt says.
+    `receipt-malformed`, `receipt-version` (a newer form), `receipt-keys` (an unreadable key set),
+    `receipt-key-unknown` (signed by another key) or `receipt-altered` (a wrong signature).
     """
 
     def __init__(self, code: str, message: str) -> None:
@@ -45,7 +44,7 @@ class NotVerified(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verified:
-    """A receipt with a checked signature. `method` is the name that the method had when it was signed."""
+    """A receipt with a checked signature; `method` is the name at signing."""
 
     site: str
     key_id: str
@@ -64,7 +63,6 @@ class Verified:
 
 
 def decimal(value: float | None, *, decimals: int) -> str | None:
-    """A score as a receipt has it."""
     return None if value is None else f"{value:.{decimals}f}"
 
 
@@ -72,26 +70,24 @@ def decimal(value: float | None, *, decimals: int) -> str | None:
 
 
 def public_key(private_key: bytes) -> bytes:
-    """The public half of an Ed25519 seed."""
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey  # noqa: PLC0415 - slow to import
 
     return Ed25519PrivateKey.from_private_bytes(private_key).public_key().public_bytes_raw()
 
 
 def key_id(public_key: bytes) -> str:
-    """The name of an Ed25519 public key of 32 bytes: its RFC 7638 thumbprint."""
+    """Return the RFC 7638 thumbprint of an Ed25519 public key of 32 bytes."""
     members = {"crv": "Ed25519", "kty": "OKP", "x": encode(public_key)}
     return encode(hashlib.sha256(json.dumps(members, separators=(",", ":")).encode()).digest())
 
 
 def key_set(public_keys: list[bytes]) -> Document:
-    """The JSON Web Key Set of these keys."""
     shared = {"kty": "OKP", "crv": "Ed25519", "use": "sig", "alg": "EdDSA"}
     return {"keys": [shared | {"kid": key_id(key), "x": encode(key)} for key in public_keys]}
 
 
 def read_keys(data: bytes) -> dict[str, Ed25519PublicKey]:
-    """The Ed25519 keys of a key set, by name. Raises `NotVerified` (`receipt-keys`)."""
+    """Read the Ed25519 keys of a key set, by name. Raises `NotVerified` (`receipt-keys`)."""
     from jwt import PyJWKSet, PyJWTError  # noqa: PLC0415 - slow to import
 
     try:
@@ -111,12 +107,11 @@ def _no_keys() -> dict[str, Ed25519PublicKey]:
 
 
 def encode(data: bytes) -> str:
-    """Bytes as base64url without padding."""
     return base64.urlsafe_b64encode(data).rstrip(b"=").decode()
 
 
 def decode(text: str) -> bytes:
-    """The bytes of a base64url text without padding. Raises `ValueError` for any other spelling of them."""
+    """Decode base64url without padding; raises `ValueError` for any other spelling."""
     data = base64.b64decode(text + "=" * (-len(text) % 4), altchars=b"-_", validate=True)
     if encode(data) != text:
         raise ValueError("not the canonical base64url text")
@@ -127,7 +122,7 @@ def decode(text: str) -> bytes:
 
 
 def sign(document: Mapping[str, Any], *, private_key: bytes) -> str:
-    """The receipt of these fields. `private_key` is the Ed25519 seed of 32 bytes."""
+    """Sign a receipt of these fields with an Ed25519 seed of 32 bytes."""
     import jwt  # noqa: PLC0415 - slow to import
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey  # noqa: PLC0415 - likewise
 
@@ -137,7 +132,7 @@ def sign(document: Mapping[str, Any], *, private_key: bytes) -> str:
 
 
 def verify(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
-    """Check that one of these keys (see `read_keys`) signed the receipt; read it. Raises `NotVerified`."""
+    """Check a receipt's signature by these keys (see `read_keys`) and read it. Raises `NotVerified`."""
     if len(receipt) > MAX_BYTES:
         raise _malformed(f"it has {len(receipt):,} bytes; expected at most {MAX_BYTES:,}")
     try:
@@ -154,7 +149,6 @@ def verify(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
 
 
 def _read(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> tuple[str, Document]:
-    """The name of the key, and what it signed. Raises `NotVerified`, and what reading raises."""
     import jwt  # noqa: PLC0415 - slow to import
 
     text = receipt.decode().strip()
@@ -189,7 +183,6 @@ def _malformed(what: str) -> NotVerified:
 
 
 def _verified(document: Document, named: str) -> Verified:
-    """A signed document, in the order of its protocol; of one that is newer, in the order of names."""
     rules = PROTOCOLS.get(document["protocol"])
     names = rules.score_names if rules else sorted(document["scores"])
     texts = {name: document["scores"][name] for name in names}

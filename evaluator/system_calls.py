@@ -1,9 +1,7 @@
-"""A seccomp filter of the system calls that a process may make while it reads untrusted bytes.
+"""A seccomp filter for a process that reads untrusted bytes."""
 
-The filter allows what a single thread needs that computes, reads what it has open, and writes its answer. All
-else is answered EPERM, so that a library that asks for more than it needs goes on without; a process of
-another architecture's calls ends.
-"""
+# It allows computing, reading open files and writing the answer. Other calls get EPERM, so that libraries
+# continue without them; calls of another architecture end the process.
 
 import ctypes
 import errno
@@ -52,13 +50,10 @@ _KILL: Final = 0x80000000
 
 
 class _Program(ctypes.Structure):
-    """`struct sock_fprog`."""
-
     _fields_ = (("n_instructions", ctypes.c_ushort), ("instructions", ctypes.c_char_p))
 
 
 def why_unavailable() -> str | None:
-    """Why this system filters no calls; None if it does."""
     if sys.platform != "linux":
         return f"{sys.platform} has no seccomp"
     machine = os.uname().machine
@@ -70,10 +65,7 @@ def why_unavailable() -> str | None:
 
 
 def allow_only_reading() -> None:
-    """Let this thread make the calls of `ALLOWED` alone. Irrevocable.
-
-    Raises `OSError` if the kernel takes no filter.
-    """
+    """Allow this thread only the calls of `ALLOWED`, irrevocably; raises `OSError` if the kernel refuses."""
     program = program_for(os.uname().machine)
     filter_ = _Program(len(program) // 8, program)
     fault = _prctl(_PR_SET_NO_NEW_PRIVS, 1) or _prctl(_PR_SET_SECCOMP, _MODE_FILTER, ctypes.byref(filter_))
@@ -82,12 +74,11 @@ def allow_only_reading() -> None:
 
 
 def program_for(machine: str) -> bytes:
-    """The filter as the kernel reads it, instructions of 8 bytes. Raises `KeyError` for unknown machines."""
+    """Build the filter, instructions of 8 bytes. Raises `KeyError` for unknown machines."""
     return b"".join(struct.pack("=HBBI", *one) for one in _instructions(machine))
 
 
 def _instructions(machine: str) -> Iterator[tuple[int, int, int, int]]:
-    """Operation, instructions to skip where the words are equal and where they are not, operand."""
     column, architecture = _ARCHITECTURES[machine]
     yield _LOAD, 0, 0, 4
     yield _JUMP_IF_EQUAL, 1, 0, architecture
@@ -100,7 +91,6 @@ def _instructions(machine: str) -> Iterator[tuple[int, int, int, int]]:
 
 
 def _prctl(option: int, argument: int, pointer: object = 0) -> int:
-    """The fault's number, or 0."""
     prctl = ctypes.CDLL(None, use_errno=True).prctl
     prctl.argtypes = (ctypes.c_int, ctypes.c_ulong, ctypes.c_void_p, ctypes.c_ulong, ctypes.c_ulong)
     return ctypes.get_errno() if prctl(option, argument, pointer, 0, 0) else 0

@@ -1,10 +1,10 @@
-"""The unit of inference: what is taken as independent of all else, a recording or a day.
+"""The unit of inference: a recording, a day, or the ground truth's column `unit`.
 
-Recordings of one day are alike: the same weather, the same road, the same driver. So a bootstrap draws whole
-days, and a test turns the signs of whole days, where the names of all recordings begin with a date and there
-are at least `MIN_DAYS` days; else the unit is the recording. A ground truth may name another unit of each
-recording in its column `unit`, which replaces this rule.
+The unit is the day if the names of all recordings begin with a date and there are at least `MIN_DAYS` days,
+else the recording. A column `unit` replaces this rule.
 """
+
+# Recordings of one day have the same weather, road and driver: they are alike.
 
 from __future__ import annotations
 
@@ -29,12 +29,11 @@ _DATE: Final = re.compile(r"((?:19|20)\d\d)([-_]?)(\d\d)\2(\d\d)(?!\d)", re.ASCI
 
 
 def noun_of(kind: str) -> str:
-    """The noun for one unit of this kind."""
     return _NOUNS.get(kind, kind)
 
 
 def in_words(kind: str, n: int | None = None) -> str:
-    """`n` units of a kind in words, or the noun alone.
+    """Name `n` units of a kind, or the noun alone.
 
     >>> in_words("day", 42), in_words("recording", 1), in_words("given", 12), in_words("day")
     ('42 days', '1 recording', '12 units', 'days')
@@ -44,7 +43,7 @@ def in_words(kind: str, n: int | None = None) -> str:
 
 
 def day_of(recording: str) -> date | None:
-    """The date that a recording's name begins with; None where it begins with none.
+    """Parse the date at the start of a recording's name, else None.
 
     >>> day_of("2023-04-06-13-00-46-797143"), day_of("20230314-081502"), day_of("2023_04_06_a")
     (datetime.date(2023, 4, 6), datetime.date(2023, 3, 14), datetime.date(2023, 4, 6))
@@ -62,7 +61,7 @@ def day_of(recording: str) -> date | None:
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """The units of some recordings: their `names`, and for every recording the `index` of its unit."""
+    """The units of recordings: their `names`, and the unit's `index` of every recording."""
 
     kind: str
     names: tuple[str, ...]
@@ -76,11 +75,7 @@ class Units:
 
 
 def units_of(recordings: Sequence[str], *, given: Mapping[str, str], kind: str | None = None) -> Units:
-    """The units of these recordings, by the rule or of the `kind` that is asked for.
-
-    `given` is the unit of every recording where the ground truth names units, else empty. Raises `ValueError`
-    for a kind that these recordings do not have.
-    """
+    """Return the units of recordings, by the rule or of `kind`; raises `ValueError` if they lack it."""
     days = None if kind in {RECORDING, GIVEN} or (given and kind is None) else _days(recordings)
     if kind is None:
         kind = GIVEN if given else DAY if days and len(set(days)) >= MIN_DAYS else RECORDING
@@ -101,7 +96,6 @@ def units_of(recordings: Sequence[str], *, given: Mapping[str, str], kind: str |
 
 
 def _days(recordings: Sequence[str]) -> list[str] | None:
-    """The day of every recording; None unless each has one."""
     days = [day.isoformat() for name in recordings if (day := day_of(name))]
     return days if len(days) == len(recordings) else None
 

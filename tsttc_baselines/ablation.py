@@ -1,9 +1,8 @@
-"""Ablations of Pixel MSE: one setting varied, everything else as in the paper, scores next to the paper's.
+"""Ablations of Pixel MSE: one setting varied, scores next to the paper's.
 
     rows = scores_of_settings(get_ablation("frame-gap"), folder=folder, truth=truth)
 
-The paper's numbers are of TSTTC's validation split. Other drives have other errors; what compares is how they
-change with the setting.
+The paper's numbers are of TSTTC's validation split; on other drives only the trend over settings compares.
 """
 
 from __future__ import annotations
@@ -34,10 +33,7 @@ FRAME_GAP: Final = 5
 
 @dataclass(frozen=True, slots=True)
 class Ablation:
-    """The varied setting: `parameter` of Pixel MSE, or the frame gap if that is None.
-
-    `table` names the paper's table, and is None where the paper has none.
-    """
+    """A varied setting: `parameter` of Pixel MSE, None for the frame gap; `table` is the paper's, or None."""
 
     name: str
     title: str
@@ -83,11 +79,7 @@ ABLATIONS: Final[tuple[Ablation, ...]] = (
 
 @dataclass(frozen=True, slots=True)
 class AblationRow:
-    """One setting: means over the whole folder and the paper's over its validation split, by metric.
-
-    A value is None where the paper has none, and where no sequence has the boxes that the setting needs.
-    `n_fallback` sequences have a fallback's value.
-    """
+    """The scores of one setting by metric, and the paper's; None if absent. `n_fallback` have a fallback."""
 
     setting: int | float
     scores: Mapping[str, float | None]
@@ -96,7 +88,7 @@ class AblationRow:
 
 
 def get_ablation(name: str) -> Ablation:
-    """The ablation of that name; raises `KeyError`."""
+    """Return the ablation with this name; raises `KeyError`."""
     return {ablation.name: ablation for ablation in ABLATIONS}[name]
 
 
@@ -109,10 +101,10 @@ def scores_of_settings(
     n_processes: int = 1,
     progress: Callable[[int], None] = lambda _n_done: None,
 ) -> list[AblationRow]:
-    """A row for each setting. `parameters` are those of Pixel MSE that are not varied and not the default.
+    """Score each setting; `parameters` are further ones of Pixel MSE that differ from the default.
 
-    `progress` is told how many of `n_sequences × n_settings` estimates there are. Raises `Rejected` for a
-    folder of which no sequence can be used, and for a truth that has other sequences.
+    `progress` gets the number of finished estimates of `n_sequences × n_settings`. Raises `Rejected` for an
+    unusable folder, and for a truth with other sequences.
     """
     order = _order(folder, truth)
     rows: list[AblationRow] = []
@@ -141,7 +133,6 @@ def _report(progress: Callable[[int], None], n_before: int, n_done: int) -> None
 
 
 def _order(folder: SequenceFolder, truth: GroundTruth) -> list[int]:
-    """The folder's row of each sequence of the truth; raises `Rejected` where either has further ones."""
     row_of = {anno_id: row for row, anno_id in enumerate(folder.manifest.anno_id.tolist())}
     wanted = truth.manifest.anno_id.tolist()
     different = sorted(set(wanted) ^ set(row_of))
@@ -165,7 +156,6 @@ def _outcomes(
     n_processes: int,
     progress: Callable[[int], None],
 ) -> list[Outcome]:
-    """In the order of the manifest."""
     method = get_method(METHOD)
     filled = method.filled(parameters)
     require_usable(folder, method=method, frame_gap=frame_gap)

@@ -1,13 +1,13 @@
-"""Photometric alignment: the scale, shift, gain and offset under which the reference frame shows the target.
+"""Photometric alignment (this project's own): the scale, shift, gain and offset between two frames.
 
-Not in the paper: this project's own. With u the position relative to the centre of the target box, T the
-target frame and R the reference frame, it minimises
+With u the position relative to the centre of the target box, T the target and R the reference frame, minimise
 
     sum over the box of  (R(c + α·u) - gain · T(u) - offset)²
 
-over ln α, c, gain and offset by Gauss-Newton in the inverse compositional form (Baker and Matthews, IJCV 56,
-2004): the derivatives are those of the target, so their normal equations are solved once.
+over ln α, c, gain and offset by Gauss-Newton, inverse compositional (Baker and Matthews, IJCV 56, 2004).
 """
+
+# The derivatives are those of the target, so the normal equations are solved once.
 
 from __future__ import annotations
 
@@ -54,16 +54,15 @@ _MAX_STEP: Final = 0.15
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """The baseline with its parameters: `expand` times the box is aligned, `samples` along its longer side.
+    """The baseline: `expand` times the box is aligned, with `samples` along its longer side."""
 
-    Both starts are aligned on a coarse grid; the better one is aligned again on the fine grid.
-    """
+    # Both starts are aligned on a coarse grid; the better one is aligned again on the fine grid.
 
     expand: float = 1.0
     samples: int = 64
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
-        """Align the reference frame with the target frame; see `Estimator`. The confidence is r², 0…1."""
+        """Estimate α; the confidence is r², 0…1. See `Estimator`."""
         reference_box, target_box = boxes_of_pair(clip, frame_gap=frame_gap)
         reference, target = clip.grey(TARGET - frame_gap), clip.grey(TARGET)
         box, centre = expand(target_box, self.expand), centre_of(reference_box)
@@ -81,7 +80,6 @@ class Alignment:
 
 
 def _starts(clip: Clip, *, frame_gap: int) -> Iterator[float]:
-    """The scale ratios that Pixel MSE and the boxes give."""
     with suppress(Unusable):
         yield PixelMse(search="coarse-to-fine")(clip, frame_gap=frame_gap).scale_ratio
     reference_box, target_box = boxes_of_pair(clip, frame_gap=frame_gap)
@@ -90,10 +88,7 @@ def _starts(clip: Clip, *, frame_gap: int) -> Iterator[float]:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """The scale ratio and centre that an alignment reached.
-
-    `residual` is 1 - r², r the correlation of the two patches: what gain and offset leave unexplained, 0…1.
-    """
+    """An alignment's scale ratio and centre; `residual` is 1 - r², r the correlation of both patches."""
 
     scale_ratio: float
     centre: Positions
@@ -102,12 +97,11 @@ class Fit:
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """A patch of the target frame, sampled on a grid, with everything that a step needs.
+    """A patch of the target frame on a grid, with the constants of every step.
 
-    `columns` (n,) and `rows` (m,) are the grid's offsets from the centre of the box, `blur` the standard
-    deviation of its sampling kernel, all in pixels. `design` (5, m·n) holds what the reference frame's patch
-    is a sum of: the derivatives of the target's patch by ln α, x and y, that patch, and a constant, each of
-    norm 1 after division by `norms` (5,).
+    `columns` (n,), `rows` (m,) and `blur`, the standard deviation of the sampling kernel, are in pixels from
+    the box's centre. `design` (5, m·n) has the derivatives by ln α, x and y, the patch and a constant, each
+    of norm 1 after division by `norms` (5,).
     """
 
     columns: Positions
@@ -118,10 +112,7 @@ class Template:
 
     @classmethod
     def of(cls, frame: Image, box: Box, *, n_samples: int) -> Template:
-        """The patch of `frame` (grey) under `box`, with at most `n_samples` along the longer side.
-
-        Raises `Unusable` where the patch has too little texture to tell scale, shift and gain apart.
-        """
+        """Sample `frame` (grey) under `box`; raises `Unusable` for little texture."""
         step = max(1.0, float(max(size_of(box))) / n_samples)
         columns, rows = (_offsets(float(length), step) for length in size_of(box))
         x, y = centre_of(box) - 0.5
@@ -145,7 +136,7 @@ class Template:
         return cls(columns, rows, _BLUR * step, design, norms[:, 0])
 
     def seen_in(self, frame: Image, *, centre: Positions, scale_ratio: float) -> Floats:
-        """The patch (m·n,) of `frame` (grey) about `centre` (px), `scale_ratio` times as large."""
+        """Sample the patch (m·n,) in `frame` (grey) about `centre` (px), `scale_ratio` times as large."""
         x, y = centre - 0.5
         blur = self.blur * scale_ratio
         across = Kernel.at(x + scale_ratio * self.columns, blur=blur, length=frame.shape[1])
@@ -154,11 +145,8 @@ class Template:
         return np.asarray(seen.ravel(), dtype=np.float32)
 
     def aligned(self, frame: Image, *, centre: Positions, scale_ratio: float, robust: bool = False) -> Fit:
-        """The alignment with `frame` (grey) that Gauss-Newton reaches from this centre and scale ratio.
-
-        `robust` weighs each sample by how well the step before explains it, so that lights that switch on,
-        what stands in front, and parts of the vehicle at other depths count for less.
-        """
+        """Align with `frame` (grey) by Gauss-Newton, from this centre and scale ratio."""
+        # `robust` weights samples by the step before: lights, occluders and parts at other depths count less.
         reach = max(self.columns[-1], self.rows[-1])
         limits = _MAX_STEP * np.array([1, reach, reach])
         weights = np.ones_like(self.design[0])
@@ -181,7 +169,6 @@ class Template:
         return Fit(scale_ratio, centre, residual=_unlike(self.design[3], seen - seen.mean()))
 
     def _terms(self, seen: Floats, weights: Floats) -> Positions:
-        """(5,): how much of each row of `design` is in `seen`, by weighted least squares."""
         weighted = self.design * weights
         normal = (weighted @ self.design.T).astype(np.float64)
         # The ridge keeps the equations solvable when hardly any sample has a weight.
@@ -190,19 +177,18 @@ class Template:
 
 
 def _weights(errors: Floats) -> Floats:
-    """(n,): Geman and McClure's weights; an error of twice the standard deviation of most has a quarter."""
+    """Compute Geman and McClure's weights (n,); twice the standard deviation gets a quarter."""
     scale = max(_LEAST_SCALE, 2 * 1.4826 * float(np.median(np.abs(errors))))
     return np.asarray(1 / (1 + np.square(errors / np.float32(scale))) ** 2)
 
 
 def _offsets(length: float, step: float) -> Positions:
-    """Positions `step` apart, as many as `length` holds, about 0."""
     n = max(_MIN_SAMPLES, round(length / step))
     return np.asarray((np.arange(n) - (n - 1) / 2) * (length / n))
 
 
 def _unlike(one: Floats, other: Floats) -> float:
-    """1 - r² of two patches of mean 0; 1 where their correlation r is not positive."""
+    """Compute 1 - r² of two patches of mean 0; 1 if r is not positive."""
     product = float(np.vdot(one, other))
     norms = float(np.vdot(one, one)) * float(np.vdot(other, other))
     return 1.0 if product <= 0 or norms <= 0 else max(0.0, 1 - product * product / norms)

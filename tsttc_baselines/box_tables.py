@@ -22,12 +22,11 @@ _MAX_NORMALISED: Final = 2.0
 
 
 def read_boxes(path: Path, *, manifest: Manifest) -> tuple[NDArray[np.float64], bool]:
-    """The boxes (n, 6, 4) in the manifest's order, NaN where there is none, and whether they are normalised.
+    """Read boxes (n, 6, 4) in the manifest's order, NaN if absent, and whether they are normalised.
 
-    A line `#unit=normalised` before the header says that coordinates are parts of the image's size, 0…1.
-    Raises `Rejected`, by line, for a table that is malformed, has two boxes for a frame, a sequence that the
-    manifest lacks, or the wrong unit.
+    Raises `Rejected`, by line, for a malformed table, duplicate boxes, unknown sequences or the wrong unit.
     """
+    # Normalised: a line `#unit=normalised` before the header means parts of the image's size, 0…1.
     lines, is_normalised = _lines(path)
     boxes = np.full((manifest.n_sequences, N_FRAMES, 4), np.nan)
     line_of: dict[tuple[int, int], int] = {}
@@ -68,7 +67,6 @@ _FRAMES: Final = {str(frame) for frame in range(N_FRAMES)}
 
 
 def _lines(path: Path) -> tuple[list[tuple[int, str]], bool]:
-    """The lines that are no comments, with their numbers, and whether a comment says normalised."""
     lines = list(enumerate(read_text(path).splitlines(), start=1))
     units = {line.replace(" ", "") for _, line in lines if line.replace(" ", "").startswith("#unit=")}
     if units - {NORMALISED, PIXELS} or len(units) > 1:
@@ -79,7 +77,6 @@ def _lines(path: Path) -> tuple[list[tuple[int, str]], bool]:
 
 
 def _rows(lines: list[tuple[int, str]]) -> Iterator[tuple[int, list[str]]]:
-    """Line number and the fields of `COLUMNS`, whatever the order of the columns."""
     name = "boxes.csv"
     header = [field.strip(' "\t') for field in lines[0][1].split(",")] if lines else []
     missing = [column for column in COLUMNS if column not in header]

@@ -1,4 +1,4 @@
-"""Boxes: centre and size, expansion within the image, and the scale ratio that two boxes give by themselves.
+"""Boxes: centre and size, expansion within the image, and the scale ratio of two boxes.
 
 Functions take one box (4,) or many (…, 4): x1, y1, x2, y2 in pixels, the left edge of the first pixel at 0.
 """
@@ -22,7 +22,7 @@ MAX_EXPANSION: Final = 1.1
 
 
 def centre_of(boxes: ArrayLike) -> Floats:
-    """(…, 2): x and y of the centres, in pixels.
+    """Return the centres (…, 2), x and y in pixels.
 
     >>> centre_of([10, 20, 30, 50]).tolist()
     [20.0, 35.0]
@@ -32,7 +32,7 @@ def centre_of(boxes: ArrayLike) -> Floats:
 
 
 def size_of(boxes: ArrayLike) -> Floats:
-    """(…, 2): widths and heights in pixels.
+    """Return widths and heights (…, 2) in pixels.
 
     >>> size_of([10, 20, 30, 50]).tolist()
     [20.0, 30.0]
@@ -42,7 +42,7 @@ def size_of(boxes: ArrayLike) -> Floats:
 
 
 def box_around(centre: ArrayLike, size: ArrayLike) -> Floats:
-    """(…, 4): the boxes with these centres and these widths and heights.
+    """Make boxes (…, 4) from centres and sizes.
 
     >>> box_around([20, 35], [20, 30]).tolist()
     [10.0, 20.0, 30.0, 50.0]
@@ -52,7 +52,7 @@ def box_around(centre: ArrayLike, size: ArrayLike) -> Floats:
 
 
 def expand(boxes: ArrayLike, ratio: ArrayLike) -> Floats:
-    """(…, 4): the boxes about their own centres, `ratio` times as wide and as high.
+    """Expand boxes (…, 4) `ratio` times about their centres.
 
     >>> expand([10, 20, 30, 50], 2).tolist()
     [0.0, 5.0, 40.0, 65.0]
@@ -62,7 +62,7 @@ def expand(boxes: ArrayLike, ratio: ArrayLike) -> Floats:
 
 
 def room_in_image(box: ArrayLike, *, width_px: float, height_px: float) -> float:
-    """The greatest ratio by which `box` can be expanded without leaving the image; below 1 if it leaves it.
+    """Return the greatest ratio by which `box` fits the image when expanded; below 1 if it leaves it.
 
     >>> room_in_image([10, 20, 30, 50], width_px=100, height_px=100)
     2.0
@@ -80,10 +80,9 @@ def shared_expansion(
     height_px: float,
     at_most: float = MAX_EXPANSION,
 ) -> float:
-    """The one ratio by which both boxes are expanded: `at_most`, less where either would leave the image.
+    """Return the ratio by which both boxes can be expanded within the image, at most `at_most`.
 
-    Boxes are never made smaller for the sake of the image: a box that touches or crosses its edge keeps its
-    size. A ratio `at_most` below 1 is taken as it is.
+    A box at the image's edge keeps its size; `at_most` below 1 is kept.
 
     >>> shared_expansion([10, 20, 30, 50], [1, 20, 25, 50], width_px=100, height_px=100)
     1.0833333333333333
@@ -93,10 +92,10 @@ def shared_expansion(
 
 
 def scale_ratio_of_boxes(reference: ArrayLike, target: ArrayLike, *, measure: Measure) -> Floats:
-    """(…,): α, what `measure` says of the reference boxes over what it says of the target boxes.
+    """Return α (…,): the `measure` of the reference boxes over that of the target boxes.
 
-    The paper's Detection divides areas (§6.1) and takes that for α, although an area grows with the square of
-    the size; "sqrt-area" mends that. Boxes without a size give NaN or infinity.
+    The paper's Detection divides areas (§6.1) and takes that for α; "sqrt-area" is the correct ratio. Boxes
+    without size give NaN or infinity.
 
     >>> reference, target = [0, 0, 8, 8], [0, 0, 10, 10]
     >>> [round(float(scale_ratio_of_boxes(reference, target, measure=m)), 2) for m in MEASURES]
@@ -113,7 +112,7 @@ def scale_ratio_of_boxes(reference: ArrayLike, target: ArrayLike, *, measure: Me
 
 
 def is_usable(box: ArrayLike, *, min_side_px: float = 0.0) -> bool:
-    """Whether all four numbers are finite, and both sides are greater than `min_side_px`.
+    """Whether all four numbers are finite and both sides are greater than `min_side_px`.
 
     >>> is_usable([10, 20, 30, 50]), is_usable([30, 20, 10, 50]), is_usable([10, 20, np.nan, 50])
     (True, False, False)

@@ -22,10 +22,7 @@ TARGET = N_FRAMES - 1
 
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """One sequence: its key, its boxes, and a way to its frames.
-
-    `boxes` is (6, 4) in pixels; NaN for a frame without a box. `load` decodes a frame: `load(frame, colour)`.
-    """
+    """One sequence: its key, boxes (6, 4) in pixels (NaN if absent), and `load(frame, colour)`."""
 
     anno_id: int
     boxes: NDArray[np.float64]
@@ -33,7 +30,7 @@ class Clip:
 
     @classmethod
     def from_frames(cls, frames: Sequence[Image], *, boxes: NDArray[np.float64], anno_id: int = 0) -> Clip:
-        """A clip of six images that are in memory already, all grey or all colour."""
+        """Make a clip of six images, all grey or all colour."""
 
         def load(frame: int, colour: bool) -> Image:
             image = frames[frame]
@@ -45,9 +42,9 @@ class Clip:
         return cls(anno_id=anno_id, boxes=np.asarray(boxes, dtype=np.float64), load=load)
 
     def grey(self, frame: int) -> Image:
-        """Frame 0…5 as (height, width), uint8."""
+        """Return frame 0…5 as (height, width), uint8."""
         return self.load(frame, False)
 
     def colour(self, frame: int) -> Image:
-        """Frame 0…5 as (height, width, 3), uint8, blue first."""
+        """Return frame 0…5 as (height, width, 3), uint8, blue first."""
         return self.load(frame, True)

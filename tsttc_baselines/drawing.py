@@ -1,7 +1,4 @@
-"""Small figures as lists of shapes, written as SVG text or as PNG, so that both look alike.
-
-Places and sizes are in units of the figure, a pixel each at scale 1, from the top left corner.
-"""
+"""Small figures as lists of shapes, written alike as SVG or PNG, in pixels from the top left corner."""
 
 from __future__ import annotations
 
@@ -25,8 +22,6 @@ Anchor = Literal["start", "middle", "end"]
 
 @dataclass(frozen=True, slots=True)
 class Theme:
-    """Colours as #rrggbb: the site's."""
-
     ground: str
     ink: str
     quiet: str
@@ -54,8 +49,6 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A path through points (x, y); a closed one ends where it began."""
-
     points: Sequence[tuple[float, float]]
     colour: str
     width: float = 1.0
@@ -64,8 +57,6 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Dot:
-    """A filled circle."""
-
     x: float
     y: float
     radius: float
@@ -74,8 +65,6 @@ class Dot:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """One line of text, placed by its baseline."""
-
     text: str
     x: float
     y: float
@@ -89,14 +78,13 @@ Shape = Picture | Line | Dot | Text
 
 
 def outline(box: Sequence[float], *, colour: str, width: float = 2.0) -> Line:
-    """The edges of a box x1, y1, x2, y2."""
     x1, y1, x2, y2 = box
     return Line([(x1, y1), (x2, y1), (x2, y2), (x1, y2)], colour, width, closed=True)
 
 
 @dataclass(slots=True)
 class Figure:
-    """A figure with the words that stand for it where it cannot be seen; later shapes cover earlier ones."""
+    """A figure with its description in words; later shapes cover earlier ones."""
 
     width: int
     height: int
@@ -105,7 +93,7 @@ class Figure:
     shapes: list[Shape] = field(default_factory=list)
 
     def svg(self) -> str:
-        """SVG with its pictures inside, without scripts, styles or references to other files."""
+        """Write SVG with its pictures inside, without scripts, styles or references."""
         lines = [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width} {self.height}" '
             f'width="{self.width}" height="{self.height}" role="img" font-family="{FONT}">',
@@ -117,7 +105,6 @@ class Figure:
         return "\n".join(lines) + "\n"
 
     def _pixels(self) -> Image:
-        """The figure painted with `PNG_SCALE` pixels a unit: (height, width, 3), blue first."""
         shape = (self.height * PNG_SCALE, self.width * PNG_SCALE, 3)
         canvas: Image = np.full(shape, _bgr(self.theme.ground), dtype=np.uint8)
         for each in self.shapes:
@@ -125,7 +112,6 @@ class Figure:
         return canvas
 
     def png(self) -> bytes:
-        """PNG with `PNG_SCALE` pixels a unit."""
         return _encoded(self._pixels(), ".png")
 
 
@@ -221,7 +207,7 @@ def _fixed(value: float) -> int:
 
 
 def _bgr(colour: str) -> tuple[int, int, int]:
-    """The colour as OpenCV takes it.
+    """Convert a colour for OpenCV.
 
     >>> _bgr("#00666e")
     (110, 102, 0)

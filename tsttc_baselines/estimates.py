@@ -15,10 +15,9 @@ if TYPE_CHECKING:
 class Estimate:
     """The estimate of one sequence.
 
-    `scale_ratio` is α, the object's size in the reference frame divided by its size in the target frame,
-    greater than 0. `confidence` is greater for surer estimates of the same baseline and has no unit.
-    `fallback` names, in a few lower-case words, why the value does not come from the baseline itself
-    ("box has no texture"); None where it does.
+    `scale_ratio` is α > 0, the object's size in the reference frame over that in the target frame.
+    `confidence` compares estimates of one baseline, without unit. `fallback` is why the value is not the
+    baseline's own, such as "box has no texture", else None.
     """
 
     scale_ratio: float
@@ -30,10 +29,8 @@ class Estimator(Protocol):
     """A baseline with its parameters."""
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
-        """Estimate α between frame `5 - frame_gap` (reference) and frame 5 (target), `frame_gap` in 1…5.
-
-        Raises `Unusable` where nothing can be said; the runner then takes the fallback.
-        """
+        """Estimate α between frame `5 - frame_gap` (1…5) and frame 5; raises `Unusable`."""
+        # The runner replaces an unusable clip's value by the fallback.
         ...
 
 
@@ -48,11 +45,11 @@ PROBLEM_CODES: Final[dict[str, str]] = {
 
 
 class Unusable(Exception):
-    """A clip that a baseline cannot say anything about; the message is the reason that is counted."""
+    """A clip without an estimate; the message is the reason to count."""
 
 
 class SequenceFault(Unusable):
-    """A fault in the input of one sequence: its reason in a few words, and the problem in a sentence."""
+    """A fault in one sequence's input: a short reason, and the problem in a sentence."""
 
     def __init__(self, reason: str, problem: Problem) -> None:
         super().__init__(reason)

@@ -34,7 +34,6 @@ class FrameCrop:
         self._scale = side / reach_px
 
     def to_figure(self, box: Floats) -> list[float]:
-        """A box of the frame in units of the figure."""
         corner = np.array([self.picture.x, self.picture.y] * 2)
         return [float(value) for value in (box - np.tile(self._low, 2)) * self._scale + corner]
 
@@ -47,11 +46,7 @@ def search_figure(
     true_ttc_s: float | None = None,
     theme: str = "light",
 ) -> Figure:
-    """Reference and target with their boxes, the reference as it matches the target, what is left of the
-    difference, and the errors over all scale ratios with the chosen one.
-
-    `estimator` is the paper's variant. Raises `Unusable` as it does.
-    """
+    """Draw a pair's boxes, match, remaining difference, and errors over scale ratios; raises `Unusable`."""
     if estimator.variant != "paper":
         raise ValueError(f"The figure shows the paper's variant, not {estimator.variant}.")
     match = estimator.match(clip, frame_gap=frame_gap)
@@ -125,7 +120,6 @@ def _add_crops(figure: Figure, clip: Clip, estimator: PixelMse, match: Match, fr
 def _add_curve(
     figure: Figure, match: Match, estimator: PixelMse, *, frame_gap: int, true_ratio: float | None
 ) -> None:
-    """Root mean squared errors over scale ratios, with the best ones and their mean."""
     left, right, top, bottom = 70.0, figure.width - 44.0, 356.0, 488.0
     errors = np.sqrt(match.errors)
     low, high = float(match.scales[0]), float(match.scales[-1])
@@ -184,7 +178,7 @@ def _add_curve(
 
 
 def seconds(ttc_s: float) -> str:
-    """Seconds with a true minus sign, and a decimal for small values; ∞ for an object that keeps its size.
+    """Format seconds; ∞ for an object that keeps its size.
 
     >>> seconds(3.42), seconds(-12.3), seconds(1121.0), seconds(math.inf)
     ('3.4 s', '−12 s', 'over 100 s', '∞ s')
@@ -198,7 +192,7 @@ def seconds(ttc_s: float) -> str:
 
 
 def _round_up(value: float) -> float:
-    """The next of 1, 2, 3, 4, 5, 6, 8 × 10ⁿ.
+    """Round up to 1, 2, 3, 4, 5, 6 or 8 × 10ⁿ.
 
     >>> _round_up(31.0), _round_up(0.7)
     (40.0, 0.8)

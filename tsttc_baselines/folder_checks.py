@@ -1,7 +1,4 @@
-"""Faults of a folder as a whole, checked before a method runs.
-
-A fault of single sequences takes their fallback; one that all of them share is a fault of the folder.
-"""
+"""Faults that all sequences of a folder share, checked before a method runs."""
 
 from __future__ import annotations
 
@@ -24,9 +21,7 @@ _MAX_ROWS: Final = 16
 
 
 def require_usable(folder: SequenceFolder, *, method: Method, frame_gap: int) -> None:
-    """Raise `Rejected` for a folder without a box or an image that `method` needs, or with boxes in another
-    unit than pixels of its images.
-    """
+    """Raise `Rejected` for a folder without a needed box or image, or with boxes in other units."""
     frames = box_frames(method, frame_gap)
     usable = np.isfinite(folder.boxes[:, list(frames)]).all(axis=(1, 2))
     if not usable.any():
@@ -46,7 +41,7 @@ def require_usable(folder: SequenceFolder, *, method: Method, frame_gap: int) ->
 
 
 def require_complete(folder: SequenceFolder, *, method: Method, frame_gap: int) -> None:
-    """Raise `Rejected` with every sequence that lacks a box or an image, before any image is decoded."""
+    """Raise `Rejected` with every sequence that lacks a box or an image, without decoding images."""
     findings = Findings()
     for row in range(folder.n_sequences):
         try:
@@ -59,10 +54,7 @@ def require_complete(folder: SequenceFolder, *, method: Method, frame_gap: int) 
 
 
 def _require_pixels(folder: SequenceFolder) -> None:
-    """Boxes lie in their images; those of other images do not.
-
-    Images of one camera may have different sizes: rendered ones show a vehicle and its surroundings.
-    """
+    # Boxes lie in their own images. Images of one camera may have different sizes: rendered ones are crops.
     cache = ImageCache(max_bytes=0)
     for rows in _cameras(folder):
         sizes = {row: size for row in rows if (size := _size(folder, row, cache=cache)) is not None}
@@ -83,7 +75,6 @@ def _require_pixels(folder: SequenceFolder) -> None:
 
 
 def _size(folder: SequenceFolder, row: int, *, cache: ImageCache) -> tuple[int, int] | None:
-    """Width and height of the target's image; None where it cannot be had."""
     try:
         return folder.size(row, cache=cache)
     except SequenceFault:
@@ -91,7 +82,6 @@ def _size(folder: SequenceFolder, row: int, *, cache: ImageCache) -> tuple[int, 
 
 
 def _cameras(folder: SequenceFolder) -> Iterator[list[int]]:
-    """Some rows of some cameras of recordings."""
     rows_of: dict[tuple[str, str], list[int]] = {}
     for row, key in enumerate(zip(folder.manifest.bag_stamp, folder.manifest.cam_id, strict=True)):
         rows_of.setdefault(key, []).append(row)

@@ -1,4 +1,4 @@
-"""Folders of sequences: `manifest.csv`, `boxes.csv` and images, or the dataset as it is downloaded.
+"""Folders of sequences: `manifest.csv`, `boxes.csv` and images, or the downloaded dataset.
 
     manifest.csv                              anno_id,bag_stamp,cam_id,ts,track_id, as a split publishes it
     boxes.csv                                 anno_id,frame,x1,y1,x2,y2; frame 0…5, pixels
@@ -38,12 +38,11 @@ IMAGES: Final = "images"
 
 @dataclass(frozen=True, eq=False)
 class SequenceFolder:
-    """The sequences of a folder in the order of its manifest.
+    """The sequences of a folder, in its manifest's order.
 
-    `boxes` is (n, 6, 4), NaN for a frame without a box: pixels, or parts of the image's width and height
-    where `is_normalised`. `boxes_from` names their file or folder, for messages. `images` is the folder that
-    holds the folders of the recordings. `has_own_numbers` says that no manifest gave the anno_ids: a board
-    may number the sequences in another way.
+    `boxes` is (n, 6, 4), NaN if absent: pixels, or parts of the image's width and height if `is_normalised`;
+    `boxes_from` is their file or folder. `images` holds the recordings' folders. `has_own_numbers` means
+    anno_ids without a manifest, which a board may number otherwise.
     """
 
     path: Path
@@ -60,32 +59,32 @@ class SequenceFolder:
         return self.manifest.n_sequences
 
     def digest(self) -> str:
-        """Hex SHA-256 over the sequences and their boxes."""
+        """Hex SHA-256 of the sequences and their boxes."""
         content = hashlib.sha256(f"{self.manifest.digest} {self.is_normalised}".encode())
         content.update(np.ascontiguousarray(self.boxes).tobytes())
         return content.hexdigest()
 
     def rows_in_time(self) -> NDArray[np.intp]:
-        """All rows by recording, camera and time, so that sequences that share frames follow each other."""
+        """Order all rows by recording, camera and time."""
+        # Sequences that share frames follow each other.
         manifest = self.manifest
         return np.lexsort((manifest.ts_ns, np.array(manifest.cam_id), np.array(manifest.bag_stamp)))
 
     def frame_path(self, row: int, frame: int) -> Path:
-        """The file of a frame 0…5; the name with .jpg where there is none."""
+        """Return the file of a frame 0…5, or its name with .jpg."""
         camera = self.images / self.manifest.bag_stamp[row] / f"cam{self.manifest.cam_id[row]}"
         ts_ns = int(self.manifest.ts_ns[row]) - (TARGET - frame) * FRAME_STEP_NS
         paths = [camera / f"{ts_ns}{extension}" for extension in EXTENSIONS]
         return next((path for path in paths if path.exists()), paths[0])
 
     def where(self, path: Path) -> str:
-        """A path inside this folder, for messages."""
         return path.relative_to(self.path).as_posix() if path.is_relative_to(self.path) else str(path)
 
     def clip(self, row: int, *, cache: ImageCache, with_images: bool = True) -> Clip:
-        """The sequence of a row, its boxes in pixels; frames are decoded when they are asked for.
+        """Return a row's clip, boxes in pixels; frames are decoded on access.
 
-        Boxes of 0…1 need the size of the target's image; without images they are taken on `NOMINAL_SIZE`.
-        Raises `SequenceFault` where that image is needed and cannot be had; so does asking for a frame.
+        Boxes of 0…1 need the target's image size, or `NOMINAL_SIZE` without images. Raises `SequenceFault`
+        for a missing or faulty image, then or on access.
         """
         boxes = self.boxes[row]
         if self.is_normalised:
@@ -102,12 +101,11 @@ class SequenceFolder:
         return Clip(anno_id=int(self.manifest.anno_id[row]), boxes=boxes, load=load)
 
     def size(self, row: int, *, cache: ImageCache) -> tuple[int, int]:
-        """Width and height in pixels of the target's image; raises `SequenceFault`."""
+        """Return width and height of the target's image in pixels; raises `SequenceFault`."""
         path = self.existing_path(row, TARGET)
         return cache.size(path, where=self.where(path))
 
     def _image(self, path: Path, *, like: Path, colour: bool, cache: ImageCache) -> Image:
-        """An image; raises `SequenceFault` unless it has the size of the other."""
         image = cache.image(path, colour=colour, where=self.where(path))
         expected = cache.size(like, where=self.where(like))
         size = (image.shape[1], image.shape[0])
@@ -120,7 +118,7 @@ class SequenceFolder:
         return image
 
     def existing_path(self, row: int, frame: int) -> Path:
-        """The file of a frame 0…5; raises `SequenceFault`, with what is there instead."""
+        """Return the file of a frame 0…5; raises `SequenceFault`."""
         path = self.frame_path(row, frame)
         if not path.exists():
             reason, message = self._why_missing(row, frame, path)
@@ -128,7 +126,6 @@ class SequenceFolder:
         return path
 
     def _why_missing(self, row: int, frame: int, path: Path) -> tuple[str, str]:
-        """The reason in a few words, and in a sentence what is there instead."""
         sequence = f"frame {frame} of the sequence {self.manifest.anno_id[row]}"
         stamps = sorted(
             int(other.stem)
@@ -157,10 +154,10 @@ class SequenceFolder:
 
 
 def read_folder(path: Path) -> SequenceFolder:
-    """The sequences of a folder of this convention, or of the dataset as it is downloaded.
+    """Read a folder of this convention, or the downloaded dataset.
 
-    Raises `Rejected` for a folder of neither kind, and for tables or annotation files that are at fault;
-    what is wrong with single boxes and images is found sequence by sequence.
+    Raises `Rejected` for other folders and for faulty tables or annotation files; boxes and images are
+    checked later.
     """
     root = path / IMAGES if (path / IMAGES).is_dir() else path
     if (path / BOXES).is_file():
@@ -191,7 +188,6 @@ def read_folder(path: Path) -> SequenceFolder:
 
 
 def _manifest(path: Path) -> Manifest:
-    """The manifest of the folder; what is wrong with it has its file's name."""
     try:
         return read_manifest(path / MANIFEST)
     except Rejected as fault:
@@ -207,10 +203,10 @@ def _manifest(path: Path) -> Manifest:
 def read_toolkit_folder(
     path: Path, *, manifest: Manifest | None = None
 ) -> tuple[Manifest, NDArray[np.float64]] | None:
-    """The sequences and their boxes (n, 6, 4) in parts of the image; None for a folder without *.pkl.
+    """Read sequences and boxes (n, 6, 4) in parts of the image; None for a folder without *.pkl.
 
-    Sequences have the order and the anno_ids of `manifest` where one is given, else those of `tsttc
-    manifest`. Raises `Rejected` for files at fault, and where folder and manifest have different sequences.
+    `manifest` gives order and anno_ids, else `tsttc manifest` does. Raises `Rejected` for faulty files or
+    other sequences.
     """
     if not list_files(path):
         return None

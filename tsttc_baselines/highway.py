@@ -1,7 +1,6 @@
-"""Highway driving: vehicles ahead at constant relative speed, as one of three cameras sees them.
+"""Highway driving: vehicles ahead at constant relative speed, as one of three cameras sees them."""
 
-The shares of the TTC ranges, the widths of the boxes and the focal lengths are those of the dataset.
-"""
+# Shares of TTC ranges, box widths and focal lengths are those of the dataset.
 
 from __future__ import annotations
 
@@ -49,8 +48,6 @@ _EDGE_PX: Final = 24.0
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """A kind of vehicle, seen from behind; in metres."""
-
     name: str
     width_m: float
     height_m: float
@@ -69,7 +66,7 @@ VEHICLES: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """One vehicle as one camera sees it in consecutive windows: arrays are (n,) or (n, 6 frames)."""
+    """One vehicle in consecutive windows of one camera: arrays are (n,) or (n, 6 frames)."""
 
     cam_id: str
     vehicle: int
@@ -82,7 +79,6 @@ class Track:
     ego_mps: Floats
 
     def cut(self, windows: slice) -> Track:
-        """These windows alone."""
         return Track(
             cam_id=self.cam_id,
             vehicle=self.vehicle,
@@ -96,7 +92,7 @@ class Track:
 def in_view(
     *, gap_m: Floats, lateral_m: Floats, vehicle: int, cam_id: str, widths_px: tuple[float, float]
 ) -> NDArray[np.bool_]:
-    """Which windows (n,) have the whole vehicle in all six frames, with a target box of such a width."""
+    """Find the windows (n,) with the whole vehicle in all six frames, and a target box of allowed width."""
     focal_px, width_m = FOCAL_PX[cam_id], VEHICLES[vehicle].width_m
     with np.errstate(divide="ignore", invalid="ignore"):
         reach_px = focal_px * (np.abs(lateral_m) + width_m / 2) / gap_m
@@ -107,13 +103,9 @@ def in_view(
 
 
 def tracks(rng: np.random.Generator, *, ttc_range: str) -> Iterator[tuple[Track, int]]:
-    """Tracks without end, each with the number of its window that lies in this TTC range.
-
-    τ of that window is uniform in the range and its box width log-uniform in 20–200 px. Along a track τ falls
-    by 0.6 s a window: at constant relative speed an approaching vehicle comes closer, and a receding one has
-    been gone for longer. Windows in which the vehicle is too small, too large or not all in the image are not
-    in the track.
-    """
+    """Yield endless tracks, each with the number of its window in this TTC range."""
+    # That window's τ is uniform, its box width log-uniform in 20–200 px. Along a track τ falls by 0.6 s a
+    # window; windows with a vehicle too small, too large or partly outside are left out.
     while True:
         for draw in rng.random((256, 8)):
             track = _track(draw, range_s=TTC_RANGES_S[ttc_range])
@@ -122,7 +114,7 @@ def tracks(rng: np.random.Generator, *, ttc_range: str) -> Iterator[tuple[Track,
 
 
 def _track(draw: Floats, *, range_s: tuple[float, float]) -> tuple[Track, int] | None:
-    """The track that eight uniform numbers make; None where it would be faster than traffic is."""
+    """Make a track from eight uniform numbers, None if it is too fast for traffic."""
     width_px = BOX_WIDTHS_PX[0] * (BOX_WIDTHS_PX[1] / BOX_WIDTHS_PX[0]) ** draw[0]
     cam_id = tuple(FOCAL_PX)[int(draw[1] * len(FOCAL_PX))]
     vehicle = int(draw[2] * len(VEHICLES))
@@ -157,7 +149,7 @@ def _track(draw: Floats, *, range_s: tuple[float, float]) -> tuple[Track, int] |
 
 
 def stretch(good: NDArray[np.bool_], *, around: int) -> tuple[int, int]:
-    """The longest run of neighbours that are all good and include this one, as (first, last + 1).
+    """Find the longest run of good neighbours that includes `around`, as (first, last + 1).
 
     >>> stretch(np.array([True, False, True, True]), around=3)
     (2, 4)

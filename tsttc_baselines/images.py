@@ -1,7 +1,6 @@
-"""Images: read, checked, decoded when they are asked for, and the last ones kept.
+"""Images: read, checked, decoded on access, and cached."""
 
-Several objects share a frame, and sequences are taken in the order of time, so most frames are decoded once.
-"""
+# Several objects share a frame, and sequences come in order of time: most frames are decoded once.
 
 from __future__ import annotations
 
@@ -23,7 +22,7 @@ _MAX_SIZES: Final = 4096
 
 
 class ImageCache:
-    """Decoded images by path, the least recently used ones dropped; one for each process."""
+    """The last decoded images by path, one cache per process."""
 
     def __init__(self, *, max_bytes: int = MAX_CACHED_BYTES) -> None:
         self._max_bytes = max_bytes
@@ -32,7 +31,7 @@ class ImageCache:
         self._sizes: OrderedDict[Path, tuple[int, int]] = OrderedDict()
 
     def image(self, path: Path, *, colour: bool, where: str) -> Image:
-        """The image, read-only; raises `SequenceFault` at `where` for a file that is no whole image."""
+        """Return the image, read-only; raises `SequenceFault` at `where`."""
         key = (path, colour)
         cached = self._images.get(key)
         if cached is not None:
@@ -44,7 +43,7 @@ class ImageCache:
         return image
 
     def size(self, path: Path, *, where: str) -> tuple[int, int]:
-        """Width and height in pixels; decodes the image where it has not been decoded before."""
+        """Return width and height in pixels."""
         if path not in self._sizes:
             self.image(path, colour=False, where=where)
         return self._sizes[path]
@@ -62,10 +61,7 @@ class ImageCache:
 
 
 def decode(path: Path, *, colour: bool, where: str) -> Image:
-    """The image of a file: (height, width) grey, or (height, width, 3) with blue first.
-
-    Raises `SequenceFault` for a file that cannot be read, is cut off, or is not an image.
-    """
+    """Decode an image, (height, width) grey or (height, width, 3) blue first; raises `SequenceFault`."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -91,10 +87,9 @@ def _decoded(data: bytes, *, colour: bool) -> Image | None:
 
 
 def _cut_off(data: bytes) -> str | None:
-    """What is missing of an image file, whose decoder would fill the rest with grey.
-
-    The marks cannot stand inside the pixels of a JPEG, and a thumbnail stands before them.
-    """
+    """Explain what an image file lacks, else None."""
+    # A decoder would fill the rest with grey. The marks cannot be in a JPEG's pixels, and a thumbnail
+    # precedes them.
     if not data:
         return "is empty"
     is_whole = data.endswith(b"\xff\xd9")  # nearly always; what follows searches all bytes

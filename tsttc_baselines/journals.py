@@ -1,9 +1,7 @@
-"""The journal of a run: outcomes as they come, so that an ended run continues where it stopped.
+"""The journal of a run: outcomes as they come, so that an interrupted run can continue."""
 
-It is a text beside the output: a line that says which run this is, then a line of JSON for each piece of
-work. What was half-written when the run ended is cut off; a journal of another run is begun again. Two runs
-at once cannot have one journal.
-"""
+# A text next to the output: a line that names the run, then a line of JSON per piece of work. A half-written
+# line is cut off; another run's journal is overwritten.
 
 from __future__ import annotations
 
@@ -22,10 +20,7 @@ class OutputInUse(RuntimeError):
 
 
 class Journal:
-    """Outcomes of the run `key`; those that are no fallbacks hold for the next run with this key.
-
-    Fallbacks are estimated again: an image may have come in the meantime.
-    """
+    """Outcomes of the run `key`, for one run at a time; fallbacks are estimated again next time."""
 
     def __init__(self, path: Path, *, key: str) -> None:
         self.path = path
@@ -45,7 +40,7 @@ class Journal:
             raise
 
     def _read(self, key: str) -> int:
-        """Take what is there; the number of bytes that are whole lines of this run."""
+        """Read what exists; returns the number of bytes in whole lines of this run."""
         end = 0
         for line in self._file:
             entry = _entry(line)
@@ -57,7 +52,7 @@ class Journal:
         return end
 
     def add(self, outcomes: Sequence[Outcome], *, seconds: float) -> None:
-        """Note a piece of work, and how long the run has taken until now."""
+        """Note a piece of work, and the run's time until now."""
         values = [(outcome.row, outcome.scale_ratio) for outcome in outcomes if outcome.reason is None]
         self._write({"values": values, "seconds": seconds})
 
@@ -66,7 +61,6 @@ class Journal:
         self._file.flush()
 
     def discard(self) -> None:
-        """The run is over."""
         self._file.close()
         self.path.unlink(missing_ok=True)
 
@@ -80,7 +74,7 @@ class Journal:
 
 
 def _lock(file: IO[bytes]) -> None:
-    """The file is this process's until it is closed; raises `OutputInUse`. Windows has no such locks."""
+    """Lock the file until it is closed, except on Windows; raises `OutputInUse`."""
     if sys.platform == "win32":
         return
     import fcntl  # noqa: PLC0415 -- as above
@@ -92,7 +86,6 @@ def _lock(file: IO[bytes]) -> None:
 
 
 def _entry(line: bytes) -> dict[str, Any] | None:
-    """Parse a line; None for one that is not whole."""
     if not line.endswith(b"\n"):
         return None
     try:

@@ -17,11 +17,9 @@ _REACH: Final = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """The sampling of one axis of a frame: a Gaussian about each position, cut off where the frame ends.
+    """The Gaussian sampling of one axis: `weights` (n, k) times the slice `pixels` (k,) gives samples."""
 
-    `weights` (n, k) times the pixels of the slice `pixels` (k,) gives the samples; `slopes` gives their
-    derivatives by position.
-    """
+    # Cut off at the frame's ends. `slopes` gives the derivatives by position.
 
     pixels: slice
     weights: Floats
@@ -29,7 +27,7 @@ class Kernel:
 
     @classmethod
     def at(cls, positions: Positions, *, blur: float, length: int) -> Kernel:
-        """The kernel for ascending `positions` (n,) in an axis of `length` pixels, whose edges repeat."""
+        """Make the kernel for ascending `positions` (n,) in an axis of `length` pixels; edges repeat."""
         inside = np.clip(positions, 0, length - 1)
         first = max(0, int(inside[0] - _REACH * blur))
         last = min(length, int(inside[-1] + _REACH * blur) + 2)

@@ -1,7 +1,7 @@
-"""The register of methods: what `tsttc baseline list` shows and `tsttc baseline run` runs.
+"""The register of methods, for `tsttc baseline list` and `run`.
 
-To add a method, write its estimator and add one row to `METHODS`. The command line makes its options from
-the parameters; nothing heavy is imported before an estimator is made.
+To add a method, write its estimator and add one row to `METHODS`; its parameters become options. Imports are
+late.
 """
 
 from __future__ import annotations
@@ -22,11 +22,9 @@ Value = str | int | float | Path | None
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter of a method, and the option of the command line with its name.
+    """A parameter of a method and its option; `low` and `high` are inclusive."""
 
-    Methods may share a name, with defaults of their own; then kind, choices and limits are the same.
-    `low` and `high` are inclusive.
-    """
+    # Methods may share a name, with their own defaults but the same kind, choices and limits.
 
     name: str
     default: Value
@@ -38,24 +36,22 @@ class Parameter:
 
     @property
     def default_in_words(self) -> str | None:
-        """The default as messages show it, of a file its name; None where there is none."""
+        """The default in words, of a file its name; None without one."""
         if self.default is None:
             return None
         return self.default.name if isinstance(self.default, Path) else str(self.default)
 
     @property
     def option(self) -> str:
-        """`--name`, as it is typed."""
         return "--" + self.name.replace("_", "-")
 
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A baseline: its name, what it needs of a sequence, and how to make its estimator.
+    """A baseline: name, inputs, parameters and estimator.
 
-    `factory` is "module:name" of a callable that takes the parameters by keyword. `published` holds the
-    values with which the method is that of a published row; None for a method that no paper has.
-    `frames` are the images that it looks at: none, the pair of reference and target, or all between them too.
+    `factory` is "module:name" of a callable with the parameters as keywords. `published` are the values of a
+    published row, or None. `frames` are the images it needs: none, reference and target, or all between.
     """
 
     name: str
@@ -68,10 +64,7 @@ class Method:
     boxes: Literal["pair", "target"] = "pair"
 
     def filled(self, given: Mapping[str, Value]) -> dict[str, Value]:
-        """All parameters in their order: those given, else the defaults.
-
-        Raises `KeyError` for a stranger and `ValueError` for a number that is not finite.
-        """
+        """Fill in defaults, in order; raises `KeyError` for unknown names, `ValueError` if not finite."""
         known = {parameter.name: parameter.default for parameter in self.parameters}
         strangers = [name for name in given if name not in known]
         if strangers:
@@ -83,14 +76,13 @@ class Method:
         return known | dict(given)
 
     def provenance(self, parameters: Mapping[str, Value]) -> str:
-        """Whether these parameters are those of a published row: as published, variant or unpublished."""
+        """Compare these parameters with the published row: as published, variant or unpublished."""
         if self.published is None:
             return "unpublished"
         is_published = all(parameters[name] == value for name, value in self.published.items())
         return "as published" if is_published else "variant"
 
     def estimator(self, parameters: Mapping[str, Value]) -> Estimator:
-        """The estimator with these parameters."""
         module, _, name = self.factory.partition(":")
         made: Estimator = getattr(import_module(module), name)(**parameters)
         return made
@@ -203,5 +195,5 @@ METHODS: Final[tuple[Method, ...]] = (
 
 
 def get_method(name: str) -> Method:
-    """The method of that name; raises `KeyError`."""
+    """Return the method with this name; raises `KeyError`."""
     return {method.name: method for method in METHODS}[name]

@@ -21,7 +21,7 @@ NO_SCALE_CHANGE: Final = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The value of a row; `problem` says why it is a fallback, and `reason` is the same in a few words."""
+    """The value of a row; for a fallback `problem` says why, `reason` in a few words."""
 
     row: int
     scale_ratio: float
@@ -30,7 +30,7 @@ class Outcome:
 
 
 class SequenceEstimator:
-    """A method with its parameters on a folder; it keeps the images that neighbouring sequences share."""
+    """A method with its parameters on a folder, with a cache of images."""
 
     def __init__(
         self, *, folder: SequenceFolder, method: Method, parameters: Mapping[str, Value], frame_gap: int
@@ -42,7 +42,7 @@ class SequenceEstimator:
         self._cache = ImageCache()
 
     def __call__(self, row: int) -> Outcome:
-        """The value of one row, whatever is wrong with it."""
+        """Estimate one row, by a fallback if necessary."""
         try:
             estimate = self._estimate(row)
         except SequenceFault as fault:

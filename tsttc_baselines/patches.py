@@ -1,7 +1,6 @@
-"""Patches: a part of a frame as grey levels, sampled on even grids at places between the pixels.
+"""Patches: a part of a frame as grey levels, sampled on even grids between the pixels."""
 
-What lies outside the frame repeats its border, so that no sequence has to be dropped for its place.
-"""
+# The frame's border repeats outside, so that no sequence is dropped for its position.
 
 from __future__ import annotations
 
@@ -38,17 +37,17 @@ _MAX_ROW: Final = 2**15 - 1
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """A part of a frame. `pixels` is float32 (rows, columns) or (rows, columns, 3) in grey levels 0 … 255;
-    `origin` is the place of its top left corner in the frame, `pixel_size` the size of its pixels there, both
-    (2,), x and y, in pixels of the frame.
-    """
+    """A part of a frame: `pixels` float32 (rows, columns), or (rows, columns, 3), in grey levels 0 … 255."""
+
+    # `origin` is the top left corner, `pixel_size` the size of a pixel, (2,), x and y, in pixels of the
+    # frame.
 
     pixels: Pixels
     origin: Floats
     pixel_size: Floats
 
     def shrunk(self, pixel_size: float) -> Window:
-        """The same part with pixels of about `pixel_size` old ones, means, so that texture does not alias."""
+        """Average pixels to about `pixel_size` old ones, so that texture does not alias."""
         rows, columns = self.pixels.shape[:2]
         n_columns, n_rows = max(1, round(columns / pixel_size)), max(1, round(rows / pixel_size))
         pixels = cv2.resize(self.pixels, (n_columns, n_rows), interpolation=cv2.INTER_AREA)
@@ -56,13 +55,10 @@ class Window:
         return Window(np.asarray(pixels, dtype=np.float32), self.origin, self.pixel_size * growth)
 
     def darker(self, levels: float) -> Window:
-        """The same part, all its grey levels so much less."""
         return Window(self.pixels - np.float32(levels), self.origin, self.pixel_size)
 
     def sample(self, x: ArrayLike, y: ArrayLike) -> Pixels:
-        """(n, rows, columns): grey levels, bilinear, at the places `x` (n, columns) and `y` (n, rows) of the
-        frame, a grid for each of the n; of pixels in colour, (n, rows, columns, 3).
-        """
+        """Sample bilinearly at `x` (n, columns), `y` (n, rows) of the frame: (n, rows, columns[, 3])."""
         columns = ((np.asarray(x) - self.origin[0]) / self.pixel_size[0] - 0.5).astype(np.float32)
         rows = ((np.asarray(y) - self.origin[1]) / self.pixel_size[1] - 0.5).astype(np.float32)
         shape = (len(columns), rows.shape[1], columns.shape[1])
@@ -77,9 +73,7 @@ class Window:
 
 
 def cut(image: Image, *, centre: ArrayLike, size: ArrayLike, pixel_size: float = 1.0) -> Window:
-    """The window about `centre` that has at least this size, with pixels of about this size, at least 1, in
-    pixels of the frame.
-    """
+    """Cut the window about `centre` of at least `size`, with pixels of about `pixel_size`, at least 1."""
     # Plain numbers: for two of them, NumPy takes ten times as long.
     (x, y), (width, height) = np.asarray(centre).tolist(), np.asarray(size).tolist()
     left, right = _ends(x, width / 2 + pixel_size)  # a pixel more for the interpolation
@@ -94,7 +88,7 @@ def _ends(middle: float, half: float) -> tuple[int, int]:
 
 
 def with_border(image: Image, low: tuple[int, int], high: tuple[int, int]) -> Pixels:
-    """Columns and rows `low` … `high` (x, y) of the image, which may lie outside; its border is repeated."""
+    """Cut columns and rows `low` … `high` (x, y), also outside the image, where the border repeats."""
     height, width = image.shape[:2]
     left, right = min(max(low[0], 0), width - 1), max(1, min(high[0], width))
     top, bottom = min(max(low[1], 0), height - 1), max(1, min(high[1], height))
@@ -106,7 +100,7 @@ def with_border(image: Image, low: tuple[int, int], high: tuple[int, int]) -> Pi
 
 
 def grid_about(centre: float, *, n_cells: int, cell_px: ArrayLike) -> Floats:
-    """(n, n_cells): centres of the cells of an even grid about `centre`, for each size in `cell_px` (n,).
+    """Return the cell centres (n, n_cells) of even grids about `centre`, for each size of `cell_px` (n,).
 
     >>> grid_about(10.0, n_cells=3, cell_px=[1.0, 2.0]).tolist()
     [[9.0, 10.0, 11.0], [8.0, 10.0, 12.0]]
@@ -116,9 +110,9 @@ def grid_about(centre: float, *, n_cells: int, cell_px: ArrayLike) -> Floats:
 
 
 def boxes_of_pair(clip: Clip, *, frame_gap: int) -> tuple[Floats, Floats]:
-    """The boxes of reference and target frame, (4,) each.
+    """Return the boxes (4,) of reference and target.
 
-    Raises `ValueError` for a gap that is not 1 … 5, and `Unusable` where a box is missing or too small.
+    Raises `ValueError` for a gap outside of 1 … 5, `Unusable` for a missing or too small box.
     """
     if not 1 <= frame_gap <= TARGET:
         raise ValueError(f"The frame gap is {frame_gap}; expected 1 to {TARGET}.")
@@ -132,7 +126,7 @@ def boxes_of_pair(clip: Clip, *, frame_gap: int) -> tuple[Floats, Floats]:
 
 
 def require_centre_inside(image: Image, box: Floats, *, name: str) -> None:
-    """Raise `Unusable` where the centre of the box lies outside the image: most of it would be border."""
+    """Raise `Unusable` if the box's centre is outside the image: most of it would be border."""
     height, width = image.shape[:2]
     x, y = centre_of(box)
     if not (0 <= x <= width and 0 <= y <= height):
@@ -140,7 +134,7 @@ def require_centre_inside(image: Image, box: Floats, *, name: str) -> None:
 
 
 def cells_of(box: Floats, *, max_cells: int = MAX_CELLS) -> NDArray[np.int_]:
-    """(2,): columns and rows of the patch of a box: a cell for a pixel, fewer for boxes over `max_cells` px.
+    """Return columns and rows (2,) of a box's patch: a cell per pixel, at most `max_cells` a side.
 
     >>> cells_of(np.array([0.0, 0, 48, 40])).tolist(), cells_of(np.array([0.0, 0, 128, 96])).tolist()
     ([48, 40], [64, 48])
@@ -150,12 +144,11 @@ def cells_of(box: Floats, *, max_cells: int = MAX_CELLS) -> NDArray[np.int_]:
 
 
 def fewer_cells(shape: tuple[float, ...], *, max_cells: int) -> NDArray[np.int_]:
-    """(2,): columns and rows for `shape` (rows, columns): as many, unless the longer side has too many."""
+    """Return columns and rows (2,) for `shape` (rows, columns), fewer if the longer side has too many."""
     cell = max(1.0, max(shape) / max_cells)
     return np.array([max(2, round(shape[1] / cell)), max(2, round(shape[0] / cell))])
 
 
 def is_flat(patch: Pixels) -> bool:
-    """Whether a patch has no texture to compare."""
     contrast = float(cv2.meanStdDev(patch)[1][0, 0])
     return not math.isfinite(contrast) or contrast < MIN_CONTRAST

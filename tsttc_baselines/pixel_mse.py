@@ -1,13 +1,13 @@
 """Pixel MSE (§5.3, §6.1): the scale at which the reference frame looks like the target box.
 
 For each scale ratio α of the bins, a box of α times the *target's* size about the reference box's centre is
-cut from the reference frame, resampled to the target's patch, and compared with it by the mean squared error.
-The box is also shifted by up to c cells of the patch in each direction, and the best of the (2c + 1)² places
-counts. α̂ is the mean of the three best bins, weighted by the reciprocals of their errors.
-
-With R the resampled reference and T the patch of n cells, MSE = (ΣR² − 2 ΣRT + ΣT²) / n: the middle term for
-all scales (rows) and all shifts (columns) is one matrix product instead of 125 × 49 cut boxes.
+cut from the reference frame, resampled to the target's patch, and compared by mean squared error, also at
+shifts of up to c cells; the best counts. α̂ is the mean of the three best bins, weighted by the reciprocals
+of their errors.
 """
+
+# With R the resampled reference and T the patch of n cells, MSE = (ΣR² − 2 ΣRT + ΣT²) / n: the middle term
+# for all scales and shifts is one matrix product instead of 125 × 49 cut boxes.
 
 from __future__ import annotations
 
@@ -61,12 +61,12 @@ _PART: Final = 1024
 
 @dataclass(frozen=True, slots=True)
 class PixelMse:
-    """The paper's Pixel MSE, or what the toolkit's code does under that name (`pixel_mse_toolkit`).
+    """The paper's Pixel MSE, or the toolkit's code of that name (`pixel_mse_toolkit`).
 
-    `bins` scale ratios over the range of the frame gap; shifts of up to `shift` cells; mean over the `top`
-    best bins; boxes `expand` times as large, where the image has room. Only the paper's variant has the other
-    two: a patch has at most `cells` cells along its longer side, each at least a pixel; and
-    `search="coarse-to-fine"` compares coarsely first, then all bins near the best one, four times as fast.
+    `bins` scale ratios; shifts up to `shift` cells; mean of the `top` best bins; boxes `expand` times as
+    large, within the image. Only the paper's variant: at most `cells` cells on a patch's longer side, each at
+    least a pixel; `search="coarse-to-fine"` compares coarsely, then the bins near the best one, four times as
+    fast.
     """
 
     variant: Variant = "paper"
@@ -78,12 +78,12 @@ class PixelMse:
     search: Search = "full"
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
-        """Raises `Unusable` where a box is missing, too small or outside the image, or has no texture."""
+        """Estimate α; raises `Unusable` for a box that is missing, too small, outside or without texture."""
         match = self.match(clip, frame_gap=frame_gap)
         return Estimate(match.scale_ratio, confidence=match.confidence)
 
     def match(self, clip: Clip, *, frame_gap: int) -> Match:
-        """The errors of all bins with the estimate; raises as a call does."""
+        """Return the errors of all bins and the estimate; raises as a call does."""
         frame = clip.colour if self.variant == "toolkit" else clip.grey
         frames = (frame(TARGET - frame_gap), frame(TARGET))
         reference_box, target_box = self.boxes(clip, frames, frame_gap=frame_gap)
@@ -111,7 +111,7 @@ class PixelMse:
         return _match(comparison, scales, errors, n_top=self.top)
 
     def boxes(self, clip: Clip, frames: tuple[Image, Image], *, frame_gap: int) -> tuple[Floats, Floats]:
-        """The expanded boxes of the reference and the target in these frames; raises as a call does."""
+        """Return both expanded boxes in these frames; raises as a call does."""
         boxes = patches.boxes_of_pair(clip, frame_gap=frame_gap)
         for image, box, name in zip(frames, boxes, ("reference", "target"), strict=True):
             patches.require_centre_inside(image, box, name=name)
@@ -122,12 +122,10 @@ class PixelMse:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """The patch of a target box, ready to be compared with a reference frame at one resolution.
+    """A target patch, ready for comparison with a reference frame at one resolution."""
 
-    `patch` is float64 (rows, columns) without its mean, which was taken off the levels of `reference` too.
-    `cell_px` (2,) is the size of its cells in pixels of the target frame, `centre` (2,) that of the reference
-    box.
-    """
+    # `patch` is float64 (rows, columns), its mean subtracted here and from `reference`; `cell_px` (2,) its
+    # cells in pixels of the target frame; `centre` (2,) the reference box's.
 
     reference: patches.Window
     centre: Floats
@@ -146,7 +144,7 @@ class Comparison:
         max_shift: int,
         max_cells: int = patches.MAX_CELLS,
     ) -> Comparison:
-        """Cut and shrink what a search up to `max_scale` and `max_shift` looks at; `Unusable` if flat."""
+        """Cut and shrink what a search up to `max_scale` and `max_shift` needs; raises `Unusable` if flat."""
         n_cells = patches.cells_of(target_box, max_cells=max_cells)
         cell_px = size_of(target_box) / n_cells
         shrink = max(1.0, float(np.max(cell_px)))
@@ -171,7 +169,7 @@ class Comparison:
         )
 
     def coarser(self, max_cells: int) -> Comparison:
-        """The same with cells that are means of several, at most `max_cells` along the longer side."""
+        """Average cells, to at most `max_cells` along the longer side."""
         n_cells = patches.fewer_cells(self.patch.shape, max_cells=max_cells)
         ratio = float(np.max(self.patch.shape[::-1] / n_cells))
         if ratio <= 1.0:
@@ -185,9 +183,7 @@ class Comparison:
         )
 
     def errors(self, scales: Floats, *, max_shift: int) -> Floats:
-        """(n, 2c + 1, 2c + 1): the mean squared errors of the scales at all shifts by −c … c cells, y before
-        x, in squared grey levels.
-        """
+        """Compute mean squared errors (n, 2c + 1, 2c + 1) of scales at shifts −c … c, y before x."""
         errors = self._errors(scales, max_shift, np.float32)
         # In float32 they are true to 1.5e-6 of the variance; where the match is so good that this shows, the
         # few scales are done again.
@@ -198,12 +194,10 @@ class Comparison:
 
     @property
     def variance(self) -> float:
-        """The variance of the patch, in squared grey levels."""
         return self._energy / self.patch.size
 
     @property
     def _energy(self) -> float:
-        """ΣT²."""
         return float(np.vdot(self.patch, self.patch))
 
     def _errors(self, scales: Floats, max_shift: int, kind: type[np.float32 | np.float64]) -> Floats:
@@ -219,7 +213,7 @@ class Comparison:
         return np.asarray(np.maximum(errors / self.patch.size, 0.0))
 
     def _placed(self, max_shift: int, kind: type[np.float32 | np.float64]) -> NDArray[Any]:
-        """((2c + 1)², cells of the sampled reference): the patch at each shift, zeros around it."""
+        """Put the patch at each shift into zeros, ((2c + 1)², cells of the sampled reference)."""
         rows, columns = self.patch.shape
         n_shifts, width = 2 * max_shift + 1, columns + 2 * max_shift
         length = (rows + 2 * max_shift) * width
@@ -238,7 +232,7 @@ class Comparison:
 
 
 def _products(sampled: NDArray[Any], placed: NDArray[Any]) -> NDArray[Any]:
-    """(n, k): every row of `sampled` (n, cells) times every row of `placed` (k, cells)."""
+    """Multiply every row of `sampled` (n, cells) by every row of `placed` (k, cells), (n, k)."""
     # In parts, because OpenBLAS takes up to twice as long for a few rows that are long.
     products: NDArray[Any] = sampled[:, :_PART] @ placed[:, :_PART].T
     for start in range(_PART, sampled.shape[1], _PART):
@@ -248,7 +242,7 @@ def _products(sampled: NDArray[Any], placed: NDArray[Any]) -> NDArray[Any]:
 
 
 def _sums_under(values: NDArray[Any], *, rows: int, columns: int) -> Floats:
-    """(n, k, k): sums over all (rows, columns) parts of the n arrays."""
+    """Sum over all (rows, columns) parts of the n arrays, (n, k, k)."""
     _, n_rows, n_columns = values.shape
     # Down first: that reads the values as they lie.
     down = _band(n_rows, rows, values.dtype).T @ values
@@ -257,7 +251,7 @@ def _sums_under(values: NDArray[Any], *, rows: int, columns: int) -> Floats:
 
 @lru_cache(maxsize=1024)
 def _band(length: int, width: int, kind: np.dtype[Any]) -> NDArray[Any]:
-    """(length, length − width + 1), read-only: in column i, ones in the rows i … i + width − 1.
+    """Return (length, length − width + 1), read-only: ones in rows i … i + width − 1 of column i.
 
     >>> _band(3, 2, np.dtype(np.float64)).tolist()
     [[1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
@@ -269,7 +263,7 @@ def _band(length: int, width: int, kind: np.dtype[Any]) -> NDArray[Any]:
 
 
 def near_the_best(comparison: Comparison, scales: Floats, *, max_shift: int) -> Floats:
-    """The scales near the best of every fifth one, which are compared in a coarser patch."""
+    """Find the scales near the best of every fifth one, by a coarser patch."""
     coarse = comparison.coarser(COARSE_CELLS)
     coarse_shift = math.ceil(max_shift * float(np.max(comparison.cell_px / coarse.cell_px)))
     errors = coarse.errors(scales[::COARSE_STEP], max_shift=coarse_shift)
@@ -278,7 +272,6 @@ def near_the_best(comparison: Comparison, scales: Floats, *, max_shift: int) -> 
 
 
 def _match(comparison: Comparison, scales: Floats, errors: Floats, *, n_top: int) -> Match:
-    """The best shift of each scale, and the mean over the best scales."""
     least, shifts = at_best_shifts(errors)
     best = best_of(least, n_top=n_top)
     return Match(

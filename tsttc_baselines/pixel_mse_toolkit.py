@@ -1,14 +1,13 @@
 """Pixel MSE as the dataset's toolkit computes it, written from a description of its behaviour.
 
-It differs from the paper in four ways that show in the numbers. It resamples the target frame, by the nearest
-pixel, and compares it with a patch of the reference frame that keeps its size. Its crop of the reference
-frame begins at the top left corner of the reference box's own surroundings but has the target's size, and its
-patch begins where the target's does: its centre is off by s (1 − α)(0.769 − 0.5/α) for an object of size s,
-which matters for α > 1. Crops over 128 px are shrunk. The weights of the best bins are a softmax of
-normalised scores, which is nearly their plain mean.
-
-One difference is ours: the toolkit drops sequences near the edge of the image; here the border is repeated.
+It differs from the paper in four ways. It resamples the target frame, by the nearest pixel, and compares it
+with a patch of the reference frame of fixed size. Its reference crop begins at the top left of the reference
+box's surroundings but has the target's size, and its patch begins where the target's does: the centre is off
+by s (1 − α)(0.769 − 0.5/α) for an object of size s, which matters for α > 1. Crops over 128 px are shrunk. A
+softmax of normalised scores weighs the best bins nearly equally.
 """
+
+# The toolkit drops sequences near the image's edge; here the border is repeated.
 
 from __future__ import annotations
 
@@ -42,9 +41,9 @@ _GROUP_PX: Final = 6
 
 @dataclass(frozen=True, slots=True)
 class Crops:
-    """What is compared: crops of both frames, (3, rows, columns) in 0 … 1, of one shape, the reference's with
-    `margin` further pixels on every side; `patch` (2,) is the object's columns and rows in them.
-    """
+    """Crops of both frames, (3, rows, columns) in 0 … 1; the reference's has `margin` more per side."""
+
+    # `patch` (2,) is the object's columns and rows in them.
 
     reference: Pixels
     target: Pixels
@@ -52,17 +51,16 @@ class Crops:
     patch: NDArray[np.int_]
 
     def starts(self, scale: float) -> NDArray[np.int_]:
-        """(2,): column and row where the patch of a scale begins, in both crops."""
+        """Return column and row (2,) where a scale's patch begins, in both crops."""
         rows, columns = self.target.shape[1:]
         return np.round((np.array([columns, rows]) - self.patch / scale) / 2).astype(int)
 
     def without(self, colour: Pixels) -> Crops:
-        """The same crops with this colour (3,) taken off every pixel."""
         taken = colour[:, np.newaxis, np.newaxis]
         return replace(self, reference=self.reference - taken, target=self.target - taken)
 
     def resampled(self, scale: float) -> Pixels:
-        """(3, rows, columns): the target's patch at the reference's size, by the nearest pixel."""
+        """Resample the target's patch to the reference's size, (3, rows, columns), by the nearest pixel."""
         shape = (self.target.shape[2], self.target.shape[1])
         columns, rows = (
             np.clip(((length - n / scale) / 2 + (np.arange(n) + 0.5) / scale).astype(int), 0, length - 1)
@@ -75,7 +73,7 @@ class Crops:
 def crops_of(
     reference: Image, target: Image, *, reference_box: Floats, target_box: Floats, room: float, max_shift: int
 ) -> Crops:
-    """The crops of two colour frames; `room` is how many times larger they are than the target box."""
+    """Crop two colour frames; `room` is their size relative to the target box."""
     size = size_of(target_box) * room
     sides = np.maximum(2, np.round(size)).astype(int)
     shape = np.maximum(2, np.round(sides * min(1.0, MAX_CROP_PX / int(np.max(sides))))).astype(int)
@@ -106,7 +104,7 @@ def search(
     max_shift: int,
     n_top: int,
 ) -> Match:
-    """All scales at all shifts of two colour frames, boxes expanded already; `Unusable` without texture."""
+    """Compare all scales and shifts of two colour frames and expanded boxes; raises `Unusable` if flat."""
     crops = crops_of(
         reference,
         target,
@@ -130,11 +128,9 @@ def search(
 
 
 def errors_of(crops: Crops, scales: Floats) -> Floats:
-    """(n, 2c + 1, 2c + 1): the mean squared error of each scale at each shift, y before x, of values 0 … 1.
-
-    Scales whose patches begin near each other are compared in one matrix product: all shifts of the part of
-    the reference that they cover, times their patches, each at its place in that part with zeros around it.
-    """
+    """Compute errors (n, 2c + 1, 2c + 1) of scales at shifts, y before x, of values 0 … 1."""
+    # Scales whose patches begin near each other share one matrix product: all shifts of their part of the
+    # reference, times the patches with zeros around.
     n_shifts = 2 * crops.margin + 1
     errors = np.empty((len(scales), n_shifts, n_shifts))
     starts = np.array([crops.starts(scale) for scale in scales])
@@ -149,11 +145,9 @@ def errors_of(crops: Crops, scales: Floats) -> Floats:
 
 
 def settle_ties(crops: Crops, scales: Floats, least: Floats, shifts: NDArray[np.int_], *, n_top: int) -> None:
-    """Compute in float64 those of `least` (n,), at `shifts` (n, 2), that are nearly as small as the best.
-
-    By the nearest pixel, neighbouring scales often give the same patch and so the same error. Products in
-    float32 round them apart, on each processor in its own way, and so choose other bins.
-    """
+    """Recompute in float64 those of `least` (n,), at `shifts` (n, 2), that nearly equal the best."""
+    # By the nearest pixel, neighbouring scales often have the same patch and error. Products in float32 would
+    # round them apart, on each processor in its own way.
     bound = float(np.sort(least)[min(n_top, len(least)) - 1])
     for index in np.flatnonzero(least <= bound * (1 + NEARLY) + SMALLEST):
         scale = float(scales[index])
@@ -165,7 +159,7 @@ def settle_ties(crops: Crops, scales: Floats, least: Floats, shifts: NDArray[np.
 
 
 def _errors_of_group(part: Pixels, crops: Crops, scales: Floats, offsets: NDArray[np.int_]) -> Floats:
-    """(n, 2c + 1, 2c + 1): as `errors_of`, for patches that begin at `offsets` (n, 2) of `part`."""
+    """Compute `errors_of` for patches that begin at `offsets` (n, 2) of `part`."""
     n_shifts = 2 * crops.margin + 1
     width, height = crops.patch
     placed = np.zeros((len(scales), *part.shape), dtype=np.float32)
@@ -185,7 +179,7 @@ def _errors_of_group(part: Pixels, crops: Crops, scales: Floats, offsets: NDArra
 
 
 def _energies(part: Pixels, offsets: NDArray[np.int_], *, width: int, height: int, n_shifts: int) -> Floats:
-    """(n, n_shifts, n_shifts): the sum of squares of `part` under each patch at each shift."""
+    """Sum the squares of `part` under each patch at each shift, (n, n_shifts, n_shifts)."""
     squares = np.sum(np.square(part, dtype=np.float64), axis=0)
     sums = np.pad(squares.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
     shifts = np.arange(n_shifts)
@@ -195,7 +189,7 @@ def _energies(part: Pixels, offsets: NDArray[np.int_], *, width: int, height: in
 
 
 def _groups(starts: NDArray[np.int_]) -> Iterator[slice]:
-    """Runs of consecutive scales whose patches begin within `_GROUP_PX` of each other."""
+    """Group consecutive scales whose patches begin within `_GROUP_PX`."""
     first = 0
     for index in range(1, len(starts) + 1):
         if index == len(starts) or np.max(np.abs(starts[index] - starts[first])) > _GROUP_PX:
@@ -204,9 +198,8 @@ def _groups(starts: NDArray[np.int_]) -> Iterator[slice]:
 
 
 def _softmax_mean(scales: Floats, errors: Floats, n_top: int) -> float:
-    """α̂ of the toolkit: scores are 1 / MSE / 255, at most 10,000; the `n_top` best and all equal to the best,
-    divided by the best, weigh as their softmax.
-    """
+    """Compute the toolkit's α̂: the softmax of scores 1 / MSE / 255, at most 10,000, divided by the best."""
+    # Of the `n_top` best scores, and all that equal the best.
     with np.errstate(divide="ignore"):
         scores = np.minimum(1.0 / errors / 255.0, MAX_SCORE)
     chosen = np.union1d(best_of(-scores, n_top=n_top), np.flatnonzero(scores == scores.max()))

@@ -1,8 +1,6 @@
-"""Work on many rows, by one process or several.
+"""Work on many rows, by one process or several, each with its own worker."""
 
-Each process has its own worker: an estimator with its images, or a renderer. All processes hold one end of a
-pipe, and end themselves when the other end is closed: by the parent when it stops, or with the parent.
-"""
+# All processes hold one end of a pipe, and end when the parent closes the other end or ends.
 
 from __future__ import annotations
 
@@ -35,17 +33,16 @@ Worker = Callable[[int], Result]
 
 
 class WorkerEnded(RuntimeError):
-    """A process ended in the midst of its work; most often the system was out of memory."""
+    """A process that ended during its work, usually out of memory."""
 
 
 def worked_through(
     make: Callable[[], Worker[Result]], rows: Sequence[int], *, n_processes: int
 ) -> Generator[Sequence[Result], None, None]:
-    """The worker's results for all rows, in pieces, in the order in which they are ready.
+    """Yield the worker's results in pieces, as they are ready; empty ones every `HEARTBEAT_S`.
 
-    An empty piece comes every `HEARTBEAT_S` while nothing is ready. `make` has to be picklable where there
-    are several processes, and the program's main module importable. Raises `WorkerEnded`. Close the iterator
-    (`contextlib.closing`) where it may not be taken to its end, or its processes work on.
+    With several processes, `make` must be picklable and the main module importable. Raises `WorkerEnded`.
+    Close the iterator (`contextlib.closing`), or its processes continue.
     """
     n_processes = min(n_processes, -(-len(rows) // _MIN_ROWS))
     if n_processes <= 1:
@@ -73,7 +70,7 @@ def worked_through(
 def _in_turn(
     pool: ProcessPoolExecutor, pieces: Sequence[Sequence[int]], *, n_ahead: int
 ) -> Iterator[Sequence[Any]]:
-    """Few pieces are handed out ahead, so that neither questions nor answers pile up."""
+    # Few pieces are handed out ahead, so that neither queue grows.
     left = iter(pieces)
     open_pieces: set[Future[list[Any]]] = set()
     while True:
@@ -91,7 +88,7 @@ def _in_turn(
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """A process that starts meanwhile never gets a Ctrl-C, which is for its parent; not so on Windows."""
+    """Keep Ctrl-C, which is for the parent, from processes that start meanwhile; not on Windows."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -115,7 +112,7 @@ def _start(make: Callable[[], Worker[Any]], theirs: Connection) -> None:
 
 
 def _end_with(theirs: Connection) -> None:
-    """Wait until the other end of the pipe is closed, and end this process whatever it does."""
+    """End this process when the other end of the pipe is closed."""
     with suppress(EOFError, OSError):
         theirs.recv_bytes()
     os._exit(1)

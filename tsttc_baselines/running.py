@@ -1,4 +1,4 @@
-"""A baseline over a folder: every sequence gets a value, in a prediction file that appears when it is whole.
+"""A baseline over a folder: a complete prediction file with a value for every sequence.
 
     folder = read_folder(Path("val"))
     run_method(folder=folder, method=get_method("detection"), parameters={}, frame_gap=5, out=Path("p.json"))
@@ -43,10 +43,10 @@ Progress = Callable[[int], None]
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The estimates of a run. `scale_ratio` is (n,) in the manifest's order.
+    """The estimates of a run; `scale_ratio` is (n,) in the manifest's order.
 
-    `n_fallback` counts by reason, the most frequent first, and `examples` has a problem for each reason.
-    `n_resumed` values come from an earlier run that was ended. `seconds` are those of all of them.
+    `n_fallback` counts by reason, most frequent first; `examples` has a problem for each. `n_resumed` values
+    come from an interrupted run, whose time `seconds` includes.
     """
 
     scale_ratio: NDArray[np.float64]
@@ -69,11 +69,11 @@ def run_method(
     strict: bool = False,
     progress: Progress = lambda _n_done: None,
 ) -> Run:
-    """Estimate every sequence of `folder` and write `out`, a prediction file of scale ratios.
+    """Estimate every sequence of `folder` and write the prediction file `out`, as scale ratios.
 
-    A run that was ended has left a journal beside `out`; the same call goes on from it. With `strict`, a
-    sequence without an estimate of the method itself is a fault: `Rejected` is raised and nothing written.
-    Raises `Rejected` for a folder that cannot be used, `WorkerEnded`, `OutputInUse` and `OSError`.
+    An interrupted run leaves a journal next to `out`; the same call continues. With `strict`, a fallback
+    raises `Rejected` and nothing is written. Raises `Rejected` for an unusable folder, `WorkerEnded`,
+    `OutputInUse` and `OSError`.
     """
     filled = method.filled(parameters)
     require_usable(folder, method=method, frame_gap=frame_gap)
@@ -137,7 +137,6 @@ def _done(
 
 
 def tsttc_version() -> str:
-    """The release of this package; of a checkout that is not installed, "0"."""
     try:
         return version("tsttc")
     except PackageNotFoundError:
@@ -145,7 +144,6 @@ def tsttc_version() -> str:
 
 
 def _key(folder: SequenceFolder, method: Method, parameters: Mapping[str, Value], frame_gap: int) -> str:
-    """Names a run: the same name, the same values."""
     named = {
         "folder": str(folder.images.resolve()),
         "sequences": folder.digest(),
@@ -159,19 +157,18 @@ def _key(folder: SequenceFolder, method: Method, parameters: Mapping[str, Value]
 
 
 def _plain(parameters: Mapping[str, Value]) -> dict[str, object]:
-    """The parameters for JSON; a file by its name alone, because its folder is private."""
+    # A file by its name alone, because its folder is private.
     return {name: value.name if isinstance(value, Path) else value for name, value in parameters.items()}
 
 
 def _weights(parameters: Mapping[str, Value]) -> dict[str, dict[str, str]]:
-    """Under "weights", the SHA-256 of each file among the parameters; nothing where there is none."""
+    """Return {"weights": SHA-256 of each file among the parameters}, or {}."""
     files = {name: value for name, value in parameters.items() if isinstance(value, Path)}
     digests = {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()}
     return {"weights": digests} if digests else {}
 
 
 def _shortened(n_fallback: Mapping[str, int]) -> dict[str, int]:
-    """The most frequent reasons, and the others together."""
     reasons = list(n_fallback.items())
     rest = sum(count for _, count in reasons[MAX_REASONS:])
     return dict(reasons[:MAX_REASONS]) | ({"other reasons": rest} if rest else {})
@@ -186,7 +183,6 @@ def _require_no_fallback(outcomes: Iterable[Outcome]) -> None:
 
 
 def _write_whole(path: Path, data: bytes) -> None:
-    """The file appears, or replaces an older one, when all of it is written."""
     new = path.with_name(f"{path.name}.{os.getpid()}.new")
     try:
         new.write_bytes(data)

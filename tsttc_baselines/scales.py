@@ -29,9 +29,9 @@ MIN_MSE: Final = 1e-6
 
 
 def scale_bins(*, frame_gap: int, n_bins: int = N_BINS) -> Floats:
-    """(n_bins,): the scale ratios that are tried, ascending, evenly spaced over the range of the frame gap.
+    """Return the scale ratios to try (n_bins,), ascending, evenly spaced for the frame gap.
 
-    Raises `ValueError` for a gap that is not 1 … 5 and for fewer than two bins.
+    Raises `ValueError` for a gap outside of 1 … 5 and for fewer than two bins.
 
     >>> scale_bins(frame_gap=5, n_bins=3).tolist()
     [0.65, 1.075, 1.5]
@@ -44,13 +44,14 @@ def scale_bins(*, frame_gap: int, n_bins: int = N_BINS) -> Floats:
 
 
 def best_of(errors: Floats, *, n_top: int) -> NDArray[np.intp]:
-    """(≤ n_top,): the places of the smallest errors, best first; of equal ones the first comes first."""
+    """Return the indices (≤ n_top,) of the smallest errors, best first."""
     return np.argsort(errors, kind="stable")[:n_top]
 
 
 def at_best_shifts(errors: Floats) -> tuple[Floats, NDArray[np.int_]]:
-    """(n,) and (n, 2): of the errors (n, 2c + 1, 2c + 1), y before x, the least of each scale, and its shift,
-    x and y from −c to c.
+    """Return each scale's least error (n,) and its shift (n, 2), x and y from −c to c.
+
+    `errors` is (n, 2c + 1, 2c + 1), y before x.
 
     >>> least, shifts = at_best_shifts(np.array([[[3.0, 3, 3], [3, 3, 1], [3, 3, 3]]]))
     >>> least.tolist(), shifts.tolist()
@@ -64,7 +65,7 @@ def at_best_shifts(errors: Floats) -> tuple[Floats, NDArray[np.int_]]:
 
 
 def weighted_scale_ratio(scales: Floats, errors: Floats) -> float:
-    """α̂ = Σ wᵢ αᵢ with wᵢ = (1/MSEᵢ) / Σ (1/MSE), the paper's mean over the best bins (§5.3).
+    """Compute α̂ = Σ wᵢ αᵢ, wᵢ = (1/MSEᵢ) / Σ (1/MSE), the paper's mean over the best bins (§5.3).
 
     >>> round(weighted_scale_ratio(np.array([0.8, 0.9]), np.array([1.0, 3.0])), 3)
     0.825
@@ -77,10 +78,9 @@ def weighted_scale_ratio(scales: Floats, errors: Floats) -> float:
 class Match:
     """The matches of a search over scale bins.
 
-    `scales` (n,) are the scale ratios that were tried, ascending; `errors` (n,) their mean squared errors,
-    each at its best shift, in squared grey levels; `shifts` (n, 2) these shifts, x and y, in cells of the
-    patch. `scale_ratio` is the estimate, `confidence` the part of the target patch's variance that the best
-    bin explains, at most 1.
+    `scales` (n,) ascending, `errors` (n,) their least mean squared errors in grey levels², `shifts` (n, 2) in
+    cells, x and y. `scale_ratio` is the estimate, `confidence` the explained part of the patch's variance, at
+    most 1.
     """
 
     scales: Floats

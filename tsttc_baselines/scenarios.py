@@ -1,13 +1,12 @@
 """The paper's six driving scripts as one kinematic model (Table 12, appendix G), solved event by event.
 
-Ego follows a vehicle on a straight road. Both have piecewise constant acceleration, so each run is a short
-list of phases, and every event (a trigger, standstill, contact, a finished lane change) is the root of a line
-or a parabola. Nothing is stepped: a frame at any time is exact.
+Ego follows a vehicle on a straight road. Accelerations are piecewise constant, so every event (a trigger,
+standstill, contact, a finished lane change) is the root of a line or a parabola, and a frame at any time is
+exact.
 
-The paper leaves open, and this module decides: a triple (a, b, s) includes b (`closed`) or not, as Python's
-`range`; a lane is 3.75 m wide; a run ends at contact (scripts 5 and 6: at 5 m), when a lane change is
-complete, or when the speeds are equal and the gap would grow; a braking vehicle stands in the end; the two
-distances of script 3 are one.
+Not in the paper: whether a triple (a, b, s) includes b (`closed`); a lane is 3.75 m wide; a run ends at
+contact (scripts 5 and 6: at 5 m), after a lane change, or at equal speeds if the gap would grow; a braking
+vehicle stops; the two distances of script 3 are one.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ _MAX_PHASES: Final = 8
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run of a script: SI units; a gap is from ego's camera to the rear of the vehicle."""
+    """One run of a script, in SI units; a gap is from ego's camera to the vehicle's rear."""
 
     script: int
     ego_mps: float
@@ -55,14 +54,13 @@ class Run:
 
 
 def _values(start: float, stop: float, step: float, *, closed: bool) -> Floats:
-    """The values of a triple; `closed` says whether `stop` belongs to them."""
     n = round((stop - start) / step) + closed
     values = np.asarray(start + step * np.arange(n), dtype=np.float64)
     return values[values <= stop + 1e-9]
 
 
 def runs(*, closed: bool = True) -> list[Run]:
-    """All runs of the scripts 1–6, in the order of the script: 3,218 with `closed` triples, else 2,089.
+    """Return all runs of scripts 1–6 in order, with `closed` or half-open triples.
 
     >>> len(runs(closed=True)), len(runs(closed=False))
     (3218, 2089)
@@ -147,7 +145,7 @@ def _closing_runs(closed: bool) -> Iterator[Run]:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """The positions of ego and vehicle at some times: arrays of one shape, NaN after the end of a run."""
+    """Positions of ego and vehicle: arrays of one shape, NaN after a run's end."""
 
     gap_m: Floats
     lateral_m: Floats
@@ -157,14 +155,14 @@ class State:
 
     @property
     def ttc_s(self) -> Floats:
-        """τ = −y / ẏ in seconds (paper Eq. 1); infinite where the gap does not change."""
+        """τ = −y / ẏ in seconds (paper Eq. 1); infinite for a constant gap."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.gap_m / (self.ego_mps - self.vehicle_mps))
 
 
 @dataclass(frozen=True, slots=True)
 class _Phase:
-    """The state of every run at the start of its phase, (n,), and the accelerations in force during it."""
+    """Every run's state at the start of its phase, (n,), and its accelerations."""
 
     start_s: Floats
     state: State
@@ -173,7 +171,7 @@ class _Phase:
     lateral_mps: Floats
 
     def after(self, passed_s: Floats) -> State:
-        """The state `passed_s` after the start of the phase."""
+        """Return the state `passed_s` after the phase's start."""
         s = self.state
         relative_mps2 = self.vehicle_mps2 - self.ego_mps2
         return State(
@@ -186,13 +184,13 @@ class _Phase:
 
 @dataclass(frozen=True)
 class Motion:
-    """The solved runs: their phases, and the time in seconds at which each of them ends, (n,)."""
+    """Solved runs: their phases and end times in seconds, (n,)."""
 
     phases: tuple[_Phase, ...]
     end_s: Floats
 
     def at(self, times_s: Floats) -> State:
-        """The state of each run at these times, (n, k) for times (k,) or (n, k)."""
+        """Return each run's state at times (k,) or (n, k), (n, k)."""
         times_s = np.broadcast_to(times_s, (self.end_s.size, np.shape(times_s)[-1]))
         number = (self._starts_s[:, None, :] <= times_s[:, :, None]).sum(axis=2) - 1
         columns = np.take_along_axis(self._table, number[None], axis=2)
@@ -208,7 +206,6 @@ class Motion:
 
     @property
     def last(self) -> State:
-        """The state of each run at its end, (n, 1)."""
         return self.at(self.end_s[:, None])
 
     @cached_property
@@ -217,7 +214,6 @@ class Motion:
 
     @cached_property
     def _table(self) -> Floats:
-        """(8, n, phases): the columns of the phases, in the order in which `at` names them."""
         return np.stack(
             [
                 np.stack(
@@ -235,10 +231,7 @@ class Motion:
 
 
 def solve(all_runs: list[Run]) -> Motion:
-    """Solve all runs together: in each round every run continues to its next event.
-
-    The loop makes one round for each phase that the longest run has, however many runs there are.
-    """
+    """Solve all runs together, one event of every run per round."""
     c = {f.name: np.array([getattr(run, f.name) for run in all_runs]) for f in fields(Run)}
     n = len(all_runs)
     state = State(
@@ -281,7 +274,7 @@ def solve(all_runs: list[Run]) -> Motion:
 
 
 def _time_to_gap(phase: _Phase, gap_m: Floats) -> Floats:
-    """Seconds until the gap has shrunk to `gap_m`: 0 where it is no greater already, ∞ where it never is."""
+    """Compute seconds until `gap_m`: 0 if already reached, ∞ if never."""
     with np.errstate(invalid="ignore", divide="ignore"):
         excess_m = phase.state.gap_m - gap_m
         closing_mps = phase.state.ego_mps - phase.state.vehicle_mps
@@ -294,13 +287,12 @@ def _time_to_gap(phase: _Phase, gap_m: Floats) -> Floats:
 
 
 def _time_to_standstill(phase: _Phase) -> Floats:
-    """Seconds until a braking vehicle has stopped."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(phase.vehicle_mps2 < 0, -phase.state.vehicle_mps / phase.vehicle_mps2, _NEVER)
 
 
 def _time_to_end(phase: _Phase, end_gap_m: Floats, *, cuts_in: NDArray[np.bool_]) -> Floats:
-    """Seconds until the last gap, a finished lane change, or equal speeds after which the gap would grow."""
+    """Compute seconds until the last gap, a finished lane change, or equal speeds."""
     s = phase.state
     relative_mps, relative_mps2 = s.vehicle_mps - s.ego_mps, phase.vehicle_mps2 - phase.ego_mps2
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -16,12 +16,10 @@ MIN_SIDE_PX: Final = 4.0
 
 
 def box_frames(method: Method, frame_gap: int) -> tuple[int, ...]:
-    """The frames whose boxes a method needs."""
     return (TARGET,) if method.boxes == "target" else (TARGET - frame_gap, TARGET)
 
 
 def image_frames(method: Method, frame_gap: int) -> tuple[int, ...]:
-    """The frames whose images a method looks at."""
     if method.frames == "none":
         return ()
     reference = TARGET - frame_gap
@@ -29,7 +27,7 @@ def image_frames(method: Method, frame_gap: int) -> tuple[int, ...]:
 
 
 def require_boxes(folder: SequenceFolder, row: int, frames: Iterable[int]) -> None:
-    """Raise `SequenceFault` where a box is missing, no box of numbers, reversed or empty."""
+    """Raise `SequenceFault` for a missing, non-numeric, reversed or empty box."""
     for frame in frames:
         x1, y1, x2, y2 = box = folder.boxes[row, frame].tolist()
         name = "target" if frame == TARGET else f"reference frame {frame}"
@@ -54,10 +52,7 @@ def require_sizes(
     *,
     image_px: tuple[int, int] | None,
 ) -> None:
-    """Raise `SequenceFault` where a box is too small, or lies outside of its image.
-
-    `image_px` is the width and height of the image; None where no image is looked at.
-    """
+    """Raise `SequenceFault` for a box too small, or outside of its image of `image_px` (width, height)."""
     for frame in frames:
         x1, y1, x2, y2 = box = clip.boxes[frame].tolist()
         statement = f"The box of frame {frame} is {_shown(box)}"

@@ -1,8 +1,4 @@
-"""Simulated splits: tracks of the six scripts and of highway driving, spread over recordings.
-
-A split gives ground truth, and for each sequence the motion from which `tsttc_baselines.rendering` makes
-frames. It needs numpy alone.
-"""
+"""Simulated splits of scripts and highway driving: ground truth, and motions for rendering."""
 
 from __future__ import annotations
 
@@ -30,7 +26,7 @@ _FRAME_NS: Final = round(1e9 / FRAME_RATE_HZ)
 
 @dataclass(frozen=True)
 class Split:
-    """n simulated sequences: their rows as a table, and the motion of the vehicle in each."""
+    """n simulated sequences: their table, and the vehicle's motion in each."""
 
     table: Table
     vehicle: tuple[int, ...]
@@ -44,23 +40,21 @@ class Split:
 
     @property
     def n_sequences(self) -> int:
-        """The number of sequences of the split; their anno_ids are 0 … n − 1."""
         return len(self.vehicle)
 
     @cached_property
     def truth(self) -> evaluator.GroundTruth:
-        """The ground truth, with its manifest."""
         return evaluator.GroundTruth.from_table(self.table)
 
     @cached_property
     def focal_px(self) -> Floats:
-        """(n,): focal length of the sequence's camera, for images 1024 px wide."""
+        """The camera's focal length of each sequence (n,), for images 1024 px wide."""
         return np.array([FOCAL_PX[cam_id] for cam_id in self.table.cam_id])
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """How a split of the dataset is made up: the shares of its TTC ranges, of the sequences within ±20 s."""
+    """The shares of TTC ranges in a split of the dataset, of the sequences within ±20 s."""
 
     shares: Mapping[str, float]
     share_beyond: float
@@ -76,7 +70,7 @@ SHAPES: Final = {
 
 
 def range_counts(*, n_sequences: int, shape: Shape) -> dict[str, int]:
-    """The number of sequences of each TTC range, and of those beyond ±20 s; they add up to `n_sequences`.
+    """Count the sequences of each TTC range, and of those beyond ±20 s.
 
     >>> range_counts(n_sequences=28_600, shape=SHAPES["test"])["crucial"]
     3771
@@ -107,7 +101,7 @@ def split(
 
 
 def scripted_split(*, rng: np.random.Generator, closed: bool = True) -> Split:
-    """Windows of the scripts' runs with τ from 0.93 to 6 s that a camera sees whole; a recording is a run."""
+    """Take windows of the scripts' runs with τ from 0.93 to 6 s in full view; a recording is a run."""
     tracks = list(_script_tracks(rng, scenarios.runs(closed=closed)))
     return _assemble(rng, tracks, n_recordings=len(tracks))
 
@@ -117,7 +111,7 @@ def _scripted(ttc_range: str, n: int) -> int:
 
 
 def _range_of(ttc_s: float) -> str:
-    """The name of the TTC range; "none" at the values that the ranges leave out."""
+    """Name the TTC range, "none" at the values between ranges."""
     for name, (low_s, high_s) in TTC_RANGES_S.items():
         if low_s <= round(ttc_s, 6) <= high_s:
             return name
@@ -125,7 +119,7 @@ def _range_of(ttc_s: float) -> str:
 
 
 def _fill(track: Track, room: dict[str, int], *, around: int) -> Track | None:
-    """The windows around one of them for which there is room, which they take; None if it has none itself."""
+    """Return the window and neighbours that have room, and take it; None without room."""
     left = dict(room)
     good = np.zeros(track.ttc_s.size, dtype=bool)
     order = sorted(range(good.size), key=lambda window: abs(window - around))
@@ -157,7 +151,7 @@ def _fill_from_scripts(rng: np.random.Generator, room: dict[str, int]) -> Iterat
 
 
 def _script_tracks(rng: np.random.Generator, runs: list[scenarios.Run]) -> Iterator[Track]:
-    """For each run its longest stretch of windows with 0.93 s ≤ τ ≤ 6 s in view of a random camera."""
+    """Find each run's longest stretch of windows with 0.93 s ≤ τ ≤ 6 s in view of a random camera."""
     motion = scenarios.solve(runs)
     n_windows = int(motion.end_s.max() * FRAME_RATE_HZ) // N_FRAMES + 1
     state = motion.at(np.arange(n_windows * N_FRAMES) / FRAME_RATE_HZ)
@@ -204,7 +198,6 @@ def _fill_from_highway(rng: np.random.Generator, room: dict[str, int]) -> Iterat
 
 
 def _assemble(rng: np.random.Generator, tracks: list[Track], *, n_recordings: int) -> Split:
-    """Spread the tracks over recordings, sort their windows, and number them from 0."""
     order = rng.permutation(len(tracks)).tolist()
     # Every recording has a track; what is left falls where it will.
     n_more = max(0, len(tracks) - n_recordings)

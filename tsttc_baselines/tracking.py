@@ -1,9 +1,8 @@
-"""SOT (paper, section 6.1): follow the target box back to the reference frame, then compare the two sizes.
+"""SOT (paper, §6.1): track the target box back to the reference frame, then compare sizes."""
 
-The paper follows with OSTrack, whose weights are not published beside it. Here the default is median flow
-(Kalal, Mikolajczyk and Matas, "Forward-backward error", ICPR 2010) on pyramidal Lucas-Kanade, which needs no
-weights; CSRT and NanoTrack are OpenCV's.
-"""
+# The paper's OSTrack has no published weights. The default is median flow (Kalal, Mikolajczyk and Matas,
+# "Forward-backward error", ICPR 2010) on pyramidal Lucas-Kanade, without weights; CSRT and NanoTrack are
+# OpenCV's.
 
 from __future__ import annotations
 
@@ -44,18 +43,16 @@ Points = NDArray[np.float32]
 
 
 class TrackerRefused(ValueError):
-    """A tracker that cannot be used here; the message says why and what to use instead."""
+    """A tracker that cannot be used here; the message names the reason and an alternative."""
 
 
 @dataclass(frozen=True, slots=True)
 class Tracking:
     """The baseline "SOT" with its parameters.
 
-    `tracker` is one of `TRACKERS`. `measure` is the size that is compared, as in `tsttc_baselines.boxes`: the
-    published rows compare areas, "sqrt-area" is the scale ratio itself. `backbone` and `head` are the paths
-    of NanoTrack's two models (ONNX), which the researcher provides.
-
-    Raises `TrackerRefused` where the tracker is unknown, absent, without models, or without scale.
+    `tracker` is one of `TRACKERS`; `measure` as in `tsttc_baselines.boxes`: areas in published rows,
+    "sqrt-area" the scale ratio itself; `backbone` and `head` are paths of NanoTrack's ONNX models. Raises
+    `TrackerRefused` if the tracker cannot be used.
     """
 
     tracker: str = "median-flow"
@@ -77,10 +74,8 @@ class Tracking:
             self._create()
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
-        """Follow the target box back over `frame_gap` frames; see `Estimator`.
-
-        The confidence is the share of grid points that were followed (median flow), else 1.
-        """
+        """Estimate α over `frame_gap` frames; see `Estimator`."""
+        # The confidence is the share of followed grid points (median flow), else 1.
         box = clip.boxes[TARGET]
         if not is_usable(box):
             raise Unusable("no box in the target frame")
@@ -98,13 +93,12 @@ class Tracking:
 
 
 def median_flow(frames: list[Image], *, box: Box) -> tuple[Box, float]:
-    """The box in the last of these grey frames, and the smallest share of points followed in a step.
+    """Track `box` (4,), in pixels, through grey frames: the last box, and the least share of points followed.
 
-    `box` (4,), in pixels, lies in the first frame. In each step the box grows by the median of the ratios of
-    the points' distances; each point then says where the centre went, and the median of these is taken.
-
-    Raises `Unusable` where too few points can be followed.
+    Raises `Unusable` for too few points.
     """
+    # In each step the box grows by the median ratio of the points' distances. Each point then predicts the
+    # centre, and the median counts.
     confidence = 1.0
     for before, after in pairwise(frames):
         starts, ends = _followed(before, after, box)
@@ -116,7 +110,7 @@ def median_flow(frames: list[Image], *, box: Box) -> tuple[Box, float]:
 
 
 def _followed(before: Image, after: Image, box: Box) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Start and end (n, 2), in pixels, of the half of the points that return closest to their start."""
+    """Return start and end (n, 2) of the half of the points that return closest to their start."""
     x0, y0, x1, y1 = _surroundings(box, before)
     first, second = before[y0:y1, x0:x1], after[y0:y1, x0:x1]
     starts = _grid(box - np.array([x0, y0, x0, y0]))
@@ -135,7 +129,7 @@ def _followed(before: Image, after: Image, box: Box) -> tuple[NDArray[np.float64
 
 
 def _surroundings(box: Box, frame: Image) -> tuple[int, int, int, int]:
-    """The part of the frame that the pyramids can reach from the box: x0, y0, x1, y1."""
+    """Return the part of the frame that the pyramids reach from the box: x0, y0, x1, y1."""
     margin = 0.5 * float(max(size_of(box))) + 24
     height, width = frame.shape[:2]
     x0, y0 = (max(0, int(value - margin)) for value in box[:2])
@@ -146,7 +140,7 @@ def _surroundings(box: Box, frame: Image) -> tuple[int, int, int, int]:
 
 
 def _grid(box: Box) -> Points:
-    """`_GRID`² points of the box, row by row: (n, 2), in OpenCV's indices: pixel centres are whole."""
+    """Return `_GRID`² points of the box, row by row (n, 2), in OpenCV's pixel-centre indices."""
     x1, y1, x2, y2 = box - 0.5
     inset_x, inset_y = _INSET * (x2 - x1), _INSET * (y2 - y1)
     columns = np.linspace(x1 + inset_x, x2 - inset_x, _GRID, dtype=np.float32)
@@ -169,7 +163,6 @@ def _flow(first: Image, second: Image, points: Points) -> tuple[Points, NDArray[
 
 
 def _growth(starts: NDArray[np.float64], ends: NDArray[np.float64]) -> float:
-    """The median over all pairs of points of their distance afterwards over their distance before."""
     one, other = np.triu_indices(len(starts), 1)
     before = np.linalg.norm(starts[one] - starts[other], axis=1)
     after = np.linalg.norm(ends[one] - ends[other], axis=1)
@@ -177,7 +170,7 @@ def _growth(starts: NDArray[np.float64], ends: NDArray[np.float64]) -> float:
 
 
 def _csrt() -> Any:  # OpenCV's trackers have no type in common
-    """A new CSRT tracker; raises `TrackerRefused` where this OpenCV has none."""
+    """Make a CSRT tracker; raises `TrackerRefused`."""
     create = getattr(cv2, "TrackerCSRT_create", None)
     if create is None:
         raise TrackerRefused(
@@ -189,7 +182,7 @@ def _csrt() -> Any:  # OpenCV's trackers have no type in common
 
 @cache  # loading takes longer than following, and `init` starts anew
 def _nano(backbone: str | Path | None, head: str | Path | None) -> Any:
-    """A new NanoTrack tracker; raises `TrackerRefused` where its models are missing or unreadable."""
+    """Make a NanoTrack tracker; raises `TrackerRefused` without readable models."""
     if backbone is None or head is None:
         raise TrackerRefused("NanoTrack needs two model files (ONNX): give both the backbone and the head.")
     for path in (backbone, head):
@@ -205,7 +198,7 @@ def _nano(backbone: str | Path | None, head: str | Path | None) -> Any:
 
 
 def _follow(tracker: Any, frames: list[Image], *, box: Box) -> Box:
-    """The box in the last of these colour frames; OpenCV's trackers round boxes to whole pixels."""
+    """Return the box in the last colour frame; OpenCV's trackers round to whole pixels."""
     x1, y1, x2, y2 = (round(float(value)) for value in box)
     tracked = (x1, y1, x2 - x1, y2 - y1)
     tracker.init(frames[0], tracked)

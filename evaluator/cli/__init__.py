@@ -46,7 +46,7 @@ COMMANDS: Final = {
 
 
 class _Group(click.Group):
-    """Words failures, ends plainly on Ctrl-C, and does without characters that a terminal lacks."""
+    """The group `tsttc`: words failures, handles Ctrl-C, replaces characters that a terminal lacks."""
 
     def invoke(self, ctx: click.Context) -> object:
         for stream in (sys.stdout, sys.stderr):
@@ -81,7 +81,6 @@ def _imported(command: str) -> click.Command:
 
 
 def own_commands() -> dict[str, click.Command]:
-    """All commands but those of other packages, imported."""
     return {name: _imported(name) for name in COMMANDS}
 
 

@@ -167,7 +167,6 @@ def publish(
 
 
 def _confirm(name: str, visibility: str, foreseen: Foreseen) -> None:
-    """Show what others will see and ask for confirmation; raises Failure without a terminal."""
     for line in _foreseen_in_words(foreseen):
         click.echo(line, err=True)
     meaning = {
@@ -189,7 +188,6 @@ def _confirm(name: str, visibility: str, foreseen: Foreseen) -> None:
 
 
 def _foreseen_in_words(foreseen: Foreseen) -> Iterator[str]:
-    """What everybody would see: the method's rows, and the ranks that would change."""
     from evaluator.cli.values import overall_of, texts_of  # noqa: PLC0415 -- others here need no scores
 
     yield printable(f"Everyone will see {foreseen.name}, team {foreseen.team}:")
@@ -217,7 +215,7 @@ def _foreseen_in_words(foreseen: Foreseen) -> Iterator[str]:
 
 
 def _asked(url: str) -> str:
-    """The token from a terminal, which does not show it, or from standard input."""
+    """Ask for the token at a terminal, without echo, or read it from standard input."""
     if not sys.stdin.isatty():
         return sys.stdin.readline()
     click.echo(

@@ -114,7 +114,7 @@ def _show(board: Board, *, is_mine: bool) -> None:
 
 
 def in_words(board: Board, *, width: int | None) -> Iterator[str]:
-    """The board as lines. Where `width` (cells) is too little for all columns, the main ones stay."""
+    """Format the board as lines; if `width` (cells) is too small, only the main columns stay."""
     facts = [board.split]
     if board.edition is not None:
         facts.append(f"edition {board.edition}")
@@ -167,7 +167,6 @@ def _table(board: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list
 
 
 def _marks_of(board: Board, name: str) -> tuple[frozenset[int], frozenset[int]]:
-    """The rows with the best and the second value of a column, among those that everybody sees."""
     from evaluator.metrics.registry import best_and_second  # noqa: PLC0415 -- only once there is a board to mark
 
     return best_and_second(
@@ -176,7 +175,6 @@ def _marks_of(board: Board, name: str) -> tuple[frozenset[int], frozenset[int]]:
 
 
 def _interval_text(entry: BoardEntry, name: str) -> str:
-    """The confidence interval to append to a value; empty if unknown."""
     from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     interval = entry.interval(name)

@@ -166,7 +166,7 @@ def table(
     *,
     decimals: int = 2,
 ) -> list[str]:
-    """Both results, and below them the difference of each column with its interval and p."""
+    """Tabulate both results, and below them each column's difference with interval and p."""
     from evaluator.scoring.results import format_rounded, rounded  # noqa: PLC0415 -- loads numpy
 
     columns = list(scores[0])

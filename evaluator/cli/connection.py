@@ -32,10 +32,8 @@ WORDS_OF_403 = frozenset({"token-scope", "token-split", "not-admitted"})
 
 @contextmanager
 def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator[Client]:
-    """A client for the site at `url`, with `token` or the one that is kept for it; raises Failure.
-
-    Before the token or a file goes anywhere, the site has to answer as a leaderboard.
-    """
+    """Open a client for the site at `url`, with `token` or the stored one; raises Failure."""
+    # The site must answer as a leaderboard before the token or a file is sent.
     bearer = token or (token_for(url) if with_token else None)
     from evaluator.client.answers import ClientError, Refused  # noqa: PLC0415 -- loads msgspec
 
@@ -66,7 +64,6 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
 
 
 def _splits_instead(client: Client, error: Refused) -> list[str]:
-    """The splits of the leaderboard, where the one that the command names is not among them."""
     from evaluator.client.answers import ClientError  # noqa: PLC0415 -- loads msgspec
 
     context = click.get_current_context(silent=True)
@@ -81,7 +78,6 @@ def _splits_instead(client: Client, error: Refused) -> list[str]:
 
 
 def version() -> str:
-    """The installed version; 0 in a checkout that was never installed."""
     import importlib.metadata  # noqa: PLC0415 -- costs more time than the rest of --help
 
     try:
@@ -91,7 +87,7 @@ def version() -> str:
 
 
 def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
-    """What happened, whose fault it is and what to do next; of a refusal `hint` says it."""
+    """Describe an error of the client and the next step; `hint` is the next step of a refusal."""
     from evaluator.client.answers import BadAnswer, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- loads msgspec
 
     refused_hint = hint
@@ -125,7 +121,6 @@ def _sentence(text: str) -> str:
 
 
 def _refused(error: Refused, *, url: str, hint: str) -> Failure:
-    """The server's own words where it gave any; else what its status means."""
     words = _sentence(error.detail) if error.detail else _words_for(error)
     return Failure(
         words,
@@ -138,7 +133,6 @@ def _refused(error: Refused, *, url: str, hint: str) -> Failure:
 
 
 def exit_code_of(error: Refused) -> Exit:
-    """Whose turn it is after a refusal."""
     if error.status in {400, 422}:
         about_options = error.problems and all(p.where in OPTIONS for p in error.problems)
         return Exit.USAGE if about_options else Exit.REJECTED
@@ -155,7 +149,7 @@ def exit_code_of(error: Refused) -> Exit:
 
 
 def _words_for(error: Refused) -> str:
-    """The message for an answer that is no problem document, such as a proxy's."""
+    # A proxy answers with no problem document.
     if error.status >= 500:
         return f"The server failed ({error.status}: {error.title}). This is not your fault."
     if error.status in {401, 403}:

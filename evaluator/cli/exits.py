@@ -7,8 +7,6 @@ from typing import Final
 
 
 class Exit(IntEnum):
-    """How a command ended."""
-
     GOOD = 0
     REJECTED = 1
     USAGE = 2

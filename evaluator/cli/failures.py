@@ -14,10 +14,7 @@ from evaluator.problems import Problem, Rejected, n_problems_in_words
 
 
 class Failure(Exception):
-    """Ends the command: a sentence, what is wrong in the file where that is known, and what to do next.
-
-    `document` is what --json prints: by default in the shape of the API's errors, with the members of `more`.
-    """
+    """The end of a command: message, problems of the file, next step, and `document` for --json."""
 
     def __init__(
         self,
@@ -46,7 +43,7 @@ class Failure(Exception):
         }
 
     def show(self) -> None:
-        """Words for a person on standard error; with --json the document on standard output as well."""
+        """Print the message on standard error, with --json also the document on standard output."""
         click.echo(f"Error: {printable(self.message)}", err=True)
         for line in numbered(self.problems):
             click.echo(line, err=True)
@@ -57,7 +54,6 @@ class Failure(Exception):
 
 
 def rejected(name: str, fault: Rejected, *, hint: str = "") -> Failure:
-    """The failure for a file that the library found at fault."""
     return Failure(
         f"{name} is rejected: {n_problems_in_words(fault.n_problems, n_lines=len(fault.problems))}",
         exit_code=Exit.REJECTED,
@@ -69,11 +65,9 @@ def rejected(name: str, fault: Rejected, *, hint: str = "") -> Failure:
 
 
 def numbered(problems: Sequence[Problem]) -> Iterator[str]:
-    """The problems as numbered lines."""
     for number, problem in enumerate(problems, start=1):
         yield f"{number:>3}. {printable(str(problem))}"
 
 
 def echo_json(document: object) -> None:
-    """One JSON document on standard output, floats at full precision."""
     click.echo(json.dumps(document, ensure_ascii=False, indent=2))

@@ -39,8 +39,6 @@ Scores = Mapping[str, float | None]
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """One comparison of a score with a number."""
-
     name: str
     operator: str
     number: float
@@ -81,7 +79,6 @@ def _condition(text: str) -> Condition:
 
 
 def fail_if_option(command: Command) -> Command:
-    """--fail-if: conditions on scores."""
     return click.option(
         "--fail-if",
         "fail_if",
@@ -102,7 +99,6 @@ def _conditions(
 
 
 def judge(conditions: Sequence[Condition], scores: Scores | None, *, decimals: int = 2) -> None:
-    """Raise Failure if one of the conditions holds or has no value."""
     known: Scores = scores or {}
     missing = [condition for condition in conditions if condition.holds(known) is None]
     holding = [condition for condition in conditions if condition.holds(known)]
@@ -133,7 +129,6 @@ def show_and_judge(
 
 
 def undecided(why: str) -> Failure:
-    """The failure of a gate for which something is missing."""
     return Failure(f"The gate cannot be evaluated: {why}.", exit_code=Exit.GATE, code="gate-undecided")
 
 
@@ -141,10 +136,8 @@ def undecided(why: str) -> Failure:
 
 
 def named(board: Board, name: str) -> BoardEntry:
-    """The board's row of a method, by id or name; raises Failure for none, or more than one.
-
-    A row that is quoted from a paper comes before a method of the same name: only teams can change names.
-    """
+    """Find a method's row by id or name; raises Failure unless there is exactly one."""
+    # A quoted row wins over a method of the same name: only teams can change names.
     rows = rows_named(board, name)
     if len(rows) == 1:
         return rows[0]
@@ -166,14 +159,14 @@ def named(board: Board, name: str) -> BoardEntry:
 
 
 def rows_named(board: Board, name: str) -> list[BoardEntry]:
-    """The rows with this id; else the quoted rows of this name; else all rows of this name."""
+    """Return the rows with this id, else the quoted rows, else all rows of this name."""
     by_id = [entry for entry in board.entries if name in {entry.id, entry.method_id}]
     by_name = [entry for entry in board.entries if name == entry.method]
     return by_id or [entry for entry in by_name if entry.kind == "published"] or by_name
 
 
 def rival(client: Client, *, split: str, method: str, own: str) -> BoardEntry | None:
-    """The other method's row, None for the file's `own` method before it has one; raises Failure."""
+    """Return the other method's row, None for `own` before it has one; raises Failure."""
     board = client.board(split)
     if method == own and not rows_named(board, method):
         words = f"{printable(method)} is not on the board of {split} yet; nothing to compare with."
@@ -186,7 +179,6 @@ def rival(client: Client, *, split: str, method: str, own: str) -> BoardEntry | 
 
 
 def judge_against(entry: BoardEntry, *, mid: float | None, decimals: int = 2) -> None:
-    """Raise Failure if MiD is worse than the other method's."""
     other = entry.scores[PRIMARY]
     if mid is None or other is None:
         raise undecided("there is no value for mid")

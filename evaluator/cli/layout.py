@@ -17,29 +17,18 @@ GAP = "  "
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """The text of one cell and its emphasis on a terminal."""
-
     text: str
     is_bold: bool = False
     is_underlined: bool = False
 
 
 def short_name(score: str) -> str:
-    """The paper's heading for a score's column.
-
-    >>> short_name("mid"), short_name("rte_crucial")
-    ('MiD', 'RTE_c')
-    """
     symbol, ttc_range = metric_of(score).symbol, split_name(score)[1]
     return symbol if ttc_range == OVERALL else f"{symbol}_{ttc_range[0]}"
 
 
 def units(scores: Iterable[str]) -> str:
-    """The units and TTC ranges of these scores' headings.
-
-    >>> units(["mid", "mid_crucial", "mid_negative", "rte"])
-    'MiD ×10⁻⁴, RTE %, lower is better; TTC ranges in s: c 0–3, n −20–0'
-    """
+    """Describe the units and TTC ranges of these scores."""
     groups = grouped_names(scores)
     ttc_ranges = dict.fromkeys(range_of(name) for names in groups.values() for name in names)
     ranges = ", ".join(f"{ttc_range.letter} {ttc_range.ends}" for ttc_range in ttc_ranges if ttc_range)
@@ -48,7 +37,7 @@ def units(scores: Iterable[str]) -> str:
 
 
 def printable(text: str) -> str:
-    """`text` without the power to move a cursor or to reorder a line: such characters are shown escaped.
+    """Escape the characters of `text` that move a terminal's cursor or reorder a line.
 
     >>> print(printable("Foo\\x1b[2J"))
     Foo\\x1b[2J
@@ -57,9 +46,7 @@ def printable(text: str) -> str:
 
 
 def aligned(rows: Sequence[Sequence[Cell]], *, align: str) -> list[str]:
-    """Lines in which every column is as wide as its widest cell.
-
-    `align` has one letter per column: `<` left, `>` right, `.` on the decimal point.
+    """Align rows into lines; `align` has a letter per column: `<` left, `>` right, `.` decimal point.
 
     >>> rows = [[Cell("a"), Cell("MiD")], [Cell("bb"), Cell("14.8")], [Cell("c"), Cell("9.25")]]
     >>> for line in aligned(rows, align="<."):
@@ -76,7 +63,7 @@ def aligned(rows: Sequence[Sequence[Cell]], *, align: str) -> list[str]:
 
 
 def width_of(text: str) -> int:
-    """The cells of a terminal that `text` fills: two for a wide (East Asian) character, none for a mark."""
+    """Count the terminal cells of `text`: two for a wide (East Asian) character, none for a mark."""
     return sum(
         0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text
     )
@@ -112,7 +99,6 @@ def result_in_words(
     decimals: int = 2,
     intervals: Mapping[str, tuple[float, float] | None] | None = None,
 ) -> Iterator[str]:
-    """One result as lines: the table, its units, and what was counted and truncated."""
     yield from score_table(scores, counts=counts, decimals=decimals, intervals=intervals)
     yield ""
     yield units(scores)
@@ -129,7 +115,7 @@ def score_table(
     decimals: int = 2,
     intervals: Mapping[str, tuple[float, float] | None] | None = None,
 ) -> list[str]:
-    """One result, below each value the ends of its interval and the number of sequences behind it."""
+    """Tabulate one result, with the ends of each interval and the number of sequences below each value."""
     from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     behind = [counts.get(split_name(name)[1]) for name in scores]

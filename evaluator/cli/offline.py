@@ -82,7 +82,6 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
 
 
 def _sequences(manifest_path: Path | None, annotations: Path | None) -> tuple[Manifest, Numbering | None]:
-    """The sequences to check against, and how the toolkit numbers them where a folder says so."""
     from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
     from evaluator.truth.numbering import read_numbering  # noqa: PLC0415 -- numpy, as above
 
@@ -151,7 +150,6 @@ def manifest(
 
 
 def _manifest_of_split(split: str, edition: int | None, url: str) -> tuple[Manifest, Numbering | None]:
-    """Get the manifest of a split from the leaderboard and check it."""
     from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
 
     with connect(url, with_token=False) as client, naming(Path(f"{url.rstrip('/')}: {split}")):
@@ -159,7 +157,6 @@ def _manifest_of_split(split: str, edition: int | None, url: str) -> tuple[Manif
 
 
 def _manifest_of(truth: Path) -> tuple[Manifest, Numbering | None]:
-    """The manifest of a table or a folder; of a folder also how the toolkit numbers it here."""
     from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
     from evaluator.truth.numbering import read_numbering  # noqa: PLC0415 -- numpy, as above
 
@@ -209,7 +206,6 @@ def _tell_table(
     output: Path | None,
     as_json: bool,
 ) -> None:
-    """The table itself, or what was written of it."""
     if as_json:
         text = {} if output is not None else {"csv": table.to_csv().decode()}
         echo_json({**document, "output": None if output is None else str(output), **text})

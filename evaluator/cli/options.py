@@ -24,18 +24,15 @@ default_option: Final = partial(click.option, show_default=True)
 
 
 def json_option(command: Command) -> Command:
-    """--json: one JSON document on standard output, whatever happens."""
     return click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")(command)
 
 
 def predictions_argument(command: Command) -> Command:
-    """PREDICTIONS: a file, or `-` for standard input."""
     kind = click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
     return click.argument("predictions", type=kind)(command)
 
 
 def output_option(what: str) -> Callable[[Command], Command]:
-    """-o: where to write."""
     return click.option(
         "-o",
         "--output",
@@ -46,7 +43,6 @@ def output_option(what: str) -> Callable[[Command], Command]:
 
 
 def url_option(command: Command) -> Command:
-    """--server: which leaderboard."""
     return click.option(
         "--server",
         "--url",
@@ -62,7 +58,6 @@ def url_option(command: Command) -> Command:
 
 
 def unit_option(command: Command) -> Command:
-    """--unit: what intervals and tests take as independent."""
     return click.option(
         "--unit",
         type=click.Choice(list(KINDS)),
@@ -73,7 +68,6 @@ def unit_option(command: Command) -> Command:
 
 
 def timeout_option(command: Command) -> Command:
-    """--timeout: how long to wait for a final state."""
     return default_option(
         "--timeout",
         "timeout_s",
@@ -92,14 +86,13 @@ def slug(_context: click.Context, _parameter: click.Parameter, value: str) -> st
 
 
 def sendable(_context: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
-    """Words that can be sent."""
     if value is not None and not is_utf8(value):
         raise click.BadParameter(f"found {value!r}, expected UTF-8 text.")
     return value
 
 
 def is_utf8(text: str) -> bool:
-    """Whether an argument or a file name was UTF-8: bytes that are not come as lone surrogates."""
+    # Arguments and file names have lone surrogates for other bytes.
     return not any("\ud800" <= character <= "\udfff" for character in text)
 
 

@@ -11,12 +11,11 @@ APPLICATION = "tsttc"
 
 
 def settings_file() -> Path:
-    """The file of settings: of the user's configuration, as each system has it."""
     return Path(click.get_app_dir(APPLICATION)) / "settings.json"
 
 
 def server_of_login() -> str | None:
-    """The address that `tsttc login` was last given; None where there was none, or it cannot be read."""
+    """Return the address of the last `tsttc login`, None if unknown."""
     try:
         settings = json.loads(settings_file().read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RuntimeError):  # no file, no JSON, no home directory
@@ -26,7 +25,6 @@ def server_of_login() -> str | None:
 
 
 def keep_server_of_login(server: str | None) -> None:
-    """Keep the address, or forget it. Raises `OSError`."""
     path = settings_file()
     if server is None:
         path.unlink(missing_ok=True)

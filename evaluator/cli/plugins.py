@@ -19,14 +19,13 @@ GROUP: Final = "tsttc.commands"
 
 @cache
 def commands() -> dict[str, EntryPoint]:
-    """The entry points by name."""
     from importlib.metadata import entry_points  # noqa: PLC0415 -- takes as long as the rest of --help
 
     return {point.name: point for point in entry_points(group=GROUP)}
 
 
 def loaded(point: EntryPoint) -> click.Command:
-    """The command of an entry point; for one that cannot be had, a command that says why."""
+    """Load an entry point's command, or a command that explains why it cannot be loaded."""
     try:
         command: click.Command = point.load()
     except Exception as error:  # noqa: BLE001 -- a foreign package may fail at anything

@@ -69,7 +69,6 @@ def _list(as_format: str) -> None:
 
 
 def _in_words(shown: PrintedTable) -> Iterator[str]:
-    """The table, its units, the paper's contradictions, its source. The default is bold and says so."""
     from evaluator.tables.published import about  # noqa: PLC0415 -- as above
 
     table = shown.table

@@ -24,7 +24,7 @@ FOLDER: Final = click.Path(exists=True, file_okay=False, path_type=Path)
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Turns the library's rejection into a failure that names the file."""
+    """Turn the library's rejection into a failure that names the file."""
     try:
         yield
     except Rejected as fault:
@@ -32,7 +32,6 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def units_asked(truth: GroundTruth, unit: str | None) -> Units:
-    """The units of `--unit`, or by the rule."""
     try:
         return truth.manifest.units_by(unit)
     except ValueError as fault:
@@ -40,12 +39,10 @@ def units_asked(truth: GroundTruth, unit: str | None) -> Units:
 
 
 def name_of(path: Path) -> str:
-    """The name of a file for a sentence."""
     return "standard input" if str(path) == "-" else str(path)
 
 
 def bytes_of(path: Path) -> bytes:
-    """The bytes of a file or of standard input."""
     if str(path) == "-":
         return sys.stdin.buffer.read()
     try:
@@ -55,7 +52,7 @@ def bytes_of(path: Path) -> bytes:
 
 
 def predictions_of(path: Path) -> bytes:
-    """A prediction file, or standard input, as the leaderboard takes it: a Parquet table becomes JSON."""
+    """Read a prediction file or standard input; a Parquet table becomes JSON."""
     from evaluator.predictions import parquet  # noqa: PLC0415 -- few files need it
 
     with naming(path):
@@ -71,7 +68,6 @@ def predictions_of(path: Path) -> bytes:
 
 
 def write_bytes(path: Path, data: bytes, *, option: str = "-o") -> None:
-    """Write what `-o`, or another option, names."""
     try:
         path.write_bytes(data)
     except OSError as error:

@@ -61,8 +61,6 @@ protocol_option = default_option(
 
 @dataclass(frozen=True, slots=True)
 class _Scored:
-    """One file, read and scored."""
-
     name: str
     report: Report
     warnings: list[FileWarning]
@@ -245,7 +243,6 @@ def _scored(paths: Sequence[Path], truth: GroundTruth, *, protocol: str) -> Iter
 
 
 def _rows(scored: _Scored, *, by: str | None, taken: Units | None) -> Iterator[ResultRow]:
-    """The rows of one file; with intervals over the units that are `taken`."""
     report, drawn = scored.report, "" if taken is None else str(taken)
     if by is not None:
         try:
@@ -287,7 +284,6 @@ def _warn(scored: _Scored, *, alone: bool) -> None:
 def _document(
     scored_files: Sequence[_Scored], rows: Sequence[ResultRow], *, by: str | None, taken: Units | None
 ) -> dict[str, Any]:
-    """The document of one file, or of several as `files`, with the groups and intervals asked for."""
     documents: list[dict[str, Any]] = []
     for one in scored_files:
         document = one.document()
@@ -343,7 +339,6 @@ def _in_words(report: Report, row: ResultRow) -> Iterator[str]:
 
 
 def _table(rows: Sequence[ResultRow], *, by: str | None) -> list[str]:
-    """A row for each file or group; the ends of its intervals are rows below it."""
     from evaluator import format_rounded  # noqa: PLC0415 -- numpy, as above
 
     names, scores = names_of(rows, by=by), list(rows[0].scores)
@@ -383,7 +378,6 @@ def _per_sequence(scored_files: Sequence[_Scored]) -> bytes:
 
 
 def _judge(conditions: list[gates.Condition], scored_files: Sequence[_Scored]) -> None:
-    """Raise for the first file that fails the gate; with several files, the message names it."""
     for one in scored_files:
         try:
             gates.judge(conditions, one.report.flat())

@@ -175,10 +175,8 @@ def status(
 
 
 def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> frozenset[str]:
-    """Warn of a doubtful file, and give the codes of the warnings; raises Failure for one at fault.
-
-    A split without a manifest is left to the server, which says what is the matter with it.
-    """
+    """Print the warnings of a file and return their codes; raises Failure for a faulty file."""
+    # The server explains why a split has no manifest.
     from evaluator import read_manifest, read_predictions  # noqa: PLC0415 -- loads numpy
     from evaluator.client.answers import Refused  # noqa: PLC0415 -- loads msgspec
     from evaluator.predictions.plausibility import warnings_of  # noqa: PLC0415 -- loads numpy
@@ -204,7 +202,6 @@ def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> fro
 
 
 def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submission:
-    """Wait until the submission is final; print each new state to standard error."""
     last_state = ""
     for submission in client.watch(submission_id, timeout_s=timeout_s):
         if submission.state != last_state and not submission.is_final:
@@ -214,7 +211,7 @@ def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submis
 
 
 def _notice_of(client: Client, method: str) -> str:
-    """Who will see the scores, in the server's words; empty if only the team, or the token may not ask."""
+    """Say who will see the scores; empty if only the team does, or the token may not ask."""
     from evaluator.client.answers import Refused  # noqa: PLC0415 -- loads msgspec
 
     try:
@@ -230,7 +227,6 @@ def _warn(notice: str, *, err: bool) -> None:
 
 
 def _require_consent() -> None:
-    """Ask the person at the terminal; a job without a terminal is not asked."""
     if sys.stdin.isatty() and not click.confirm("Submit?", err=True):
         raise Failure("Nothing was submitted.", exit_code=Exit.USAGE, code="not-confirmed")
 
@@ -242,7 +238,7 @@ def _name_to_send(path: Path) -> str:
 
 
 def _announce(submission: Submission, *, site: str, err: bool) -> None:
-    """Name the submission before waiting for it, so that an interrupted command leaves something to go on."""
+    # Before the wait: after an interruption the user can ask for this submission.
     address = f"  {urljoin(site, submission.url)}" if submission.url else ""
     click.echo(printable(f"Submission {submission.id}{address}"), err=err)
     if not submission.is_new:
@@ -256,10 +252,8 @@ def conclude(
     judge: Callable[[], None],
     warned: frozenset[str] = frozenset(),
 ) -> None:
-    """Print what is known of a submission; raises Failure when it ended without scores, or a gate fails.
-
-    Warnings with one of the codes `warned` have been printed before.
-    """
+    """Print a submission; raises Failure if it ended without scores or a gate fails."""
+    # Warnings with these codes are on the screen already.
     named = (
         f"{submission.method} on {submission.split}" if submission.method else f"submission {submission.id}"
     )

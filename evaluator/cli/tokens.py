@@ -1,7 +1,6 @@
-"""The token: from the environment, the keyring, or without a keyring a file that only its owner can read.
+"""The token: from the environment, the keyring, or a file that only its owner can read."""
 
-`keyring` is imported where it is needed: it costs more time than the rest of a command.
-"""
+# `keyring` is imported late: it takes longer than the rest of a command.
 
 from __future__ import annotations
 
@@ -25,7 +24,7 @@ SERVICE = "tsttc"  # under which the keyring files the tokens; the account is th
 
 
 def token_for(url: str) -> str:
-    """The token for the leaderboard at `url`: that of the environment, else that of `tsttc login`."""
+    """Return the token for `url`: from the environment, else from `tsttc login`."""
     value = os.environ.get(TOKEN_VARIABLE)
     if value is not None:
         return checked(value, named=TOKEN_VARIABLE)
@@ -41,13 +40,11 @@ def token_for(url: str) -> str:
 
 
 def has_token(url: str) -> bool:
-    """Whether there is a token, for commands that also work without one."""
     is_named = os.environ.get(TOKEN_VARIABLE, "").strip() or os.environ.get(TOKEN_FILE_VARIABLE)
     return bool(is_named) or kept_token(url) is not None
 
 
 def checked(text: str, *, named: str) -> str:
-    """The token that `text` is; raises Failure for one that cannot be sent."""
     value = text.strip().removeprefix("\ufeff")  # editors of Windows begin a file so
     if not value:
         raise Failure(
@@ -75,7 +72,7 @@ def _no_token(words: str, url: str) -> Failure:
 
 
 def kept_token(url: str) -> str | None:
-    """The token for `url` in the keyring or the file; None also if the keyring stays locked."""
+    """Return the token for `url` from keyring or file; None also for a locked keyring."""
     from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
 
     backend = usable_keyring()
@@ -87,7 +84,7 @@ def kept_token(url: str) -> str | None:
 
 
 def keep_token(url: str, token: str) -> str:
-    """Put the token into the keyring, else into the file; gives the name of the place."""
+    """Put the token into the keyring, else into the file; returns the name of the store."""
     from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
 
     backend = usable_keyring()
@@ -101,7 +98,6 @@ def keep_token(url: str, token: str) -> str:
 
 
 def forget_token(url: str) -> bool:
-    """Remove the token from the keyring and from the file; whether there was one."""
     from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
 
     if kept_token(url) is None:
@@ -121,7 +117,6 @@ def forget_token(url: str) -> bool:
 
 
 def usable_keyring() -> KeyringBackend | None:
-    """The operating system's keyring, if there is one that keeps anything."""
     import keyring  # noqa: PLC0415 -- as the module says
 
     try:
@@ -133,12 +128,10 @@ def usable_keyring() -> KeyringBackend | None:
 
 
 def tokens_file() -> Path:
-    """The file of tokens by server, next to that of settings."""
     return settings_file().with_name("tokens.json")
 
 
 def _kept_in_file() -> dict[str, str]:
-    """The tokens of the file; none where there is none, or it is not what was written."""
     try:
         tokens = json.loads(tokens_file().read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RuntimeError):  # no file, no JSON, no home directory
@@ -147,7 +140,7 @@ def _kept_in_file() -> dict[str, str]:
 
 
 def _keep_in_file(kept: dict[str, str]) -> str:
-    """Write the file, readable for its owner only, and return its name; without tokens, delete it."""
+    """Write the file, readable for its owner only, or delete it without tokens; returns its name."""
     path = tokens_file()
     try:
         if not kept:
@@ -178,7 +171,6 @@ def _text_of(path: Path) -> str:
 
 
 def no_keyring(words: str) -> Failure:
-    """The failure for a keyring that is not there, or does not do its work."""
     return Failure(
         words,
         exit_code=Exit.AUTH,
@@ -188,5 +180,4 @@ def no_keyring(words: str) -> Failure:
 
 
 def account(url: str) -> str:
-    """The name of a server in the keyring, the same however its address is spelt."""
     return url.rstrip("/").lower()

@@ -14,22 +14,15 @@ if TYPE_CHECKING:
 
 
 def authors_or_team(entry: BoardEntry) -> str:
-    """The team; for a row printed in a paper its authors, and that it is one."""
     team = entry.team or ""
     return f"{layouts.short_authors(team)} (published)" if entry.kind == "published" else team
 
 
 def overall_of(names: Iterable[str]) -> list[str]:
-    """The overall scores among these, each once.
-
-    >>> overall_of(["mid", "mid_small", "rte", "mid"])
-    ['mid', 'rte']
-    """
     return [name for name in dict.fromkeys(names) if split_name(name)[1] == OVERALL]
 
 
 def texts_of(entry: BoardEntry, *, missing: str, scores: Sequence[str]) -> list[str]:
-    """A submission's scores as its edition publishes them, a published row's as they were printed."""
     from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     decimals = entry.decimals
@@ -37,7 +30,6 @@ def texts_of(entry: BoardEntry, *, missing: str, scores: Sequence[str]) -> list[
 
 
 def state_in_words(submission: Submission) -> str:
-    """One line: the state, and for a waiting one how many are ahead."""
     words = printable(submission.state)
     if submission.withdrawn_at:
         words += ", withdrawn"
@@ -47,7 +39,6 @@ def state_in_words(submission: Submission) -> str:
 
 
 def in_short(submission: Submission) -> Iterator[str]:
-    """The rank of a scored submission, and the intervals of its overall errors, if known."""
     if submission.rank is not None:
         interval = submission.intervals.get(PRIMARY)
         low, high = (interval.rank_low, interval.rank_high) if interval else (None, None)

@@ -18,13 +18,12 @@ if TYPE_CHECKING:
 
 
 def echo_warnings(warnings: Iterable[FileWarning]) -> None:
-    """Each as a sentence on standard error, where it disturbs no program."""
     for warning in warnings:
         click.echo(f"Warning: {printable(warning.message)}", err=True)
 
 
 def numbering_in_words(numbering: Numbering) -> str:
-    """Whether the toolkit numbers the sequences of a folder on this machine as the manifest does."""
+    """Say whether the toolkit on this machine numbers a folder's sequences as the manifest does."""
     if not numbering.n_renumbered:
         return "The toolkit numbers the folder like the manifest: the order of files is the same."
     n_sequences = numbering.manifest.n_sequences
@@ -37,7 +36,7 @@ def numbering_in_words(numbering: Numbering) -> str:
 def numbering_warnings(
     numbering: Numbering, parsed: Predictions, *, predictions: Path, annotations: Path
 ) -> list[FileWarning]:
-    """A warning for a file of anno_ids that the toolkit has probably numbered otherwise than the manifest."""
+    """Warn of anno_ids that the toolkit has probably numbered otherwise than the manifest."""
     from evaluator.predictions.plausibility import MAX_ROUGHNESS, roughness  # noqa: PLC0415 -- loads numpy
 
     if parsed.keys != "anno_id" or not numbering.n_renumbered:

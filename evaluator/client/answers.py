@@ -18,16 +18,16 @@ JSON = dict[str, Any]
 
 
 class Queue(msgspec.Struct, frozen=True):
-    """Place in the queue: how many evaluations are ahead of this one."""
+    """The number of evaluations ahead of this one."""
 
     ahead: int
 
 
 class Submission(msgspec.Struct, frozen=True, kw_only=True):
-    """A submission. `is_new` is False for the answer to a file that was sent before.
+    """A submission. `is_new` is False if the same file was submitted before.
 
-    `rank` is that of its method, if the board shows this submission for it; of a private method the one that
-    it would have. With `awaits_intervals` they follow the scores within seconds.
+    `rank` is its method's rank if the board shows this submission; a private method's is the rank it would
+    have. With `awaits_intervals`, the intervals follow within seconds.
     """
 
     id: str
@@ -56,12 +56,12 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def is_final(self) -> bool:
-        """Whether nothing more will happen to this submission by itself."""
+        """Whether its state is final."""
         return self.state in FINAL_STATES
 
 
 class Method(msgspec.Struct, frozen=True, kw_only=True):
-    """A method; `notice` says who sees its results, where others than its team do."""
+    """A method; `notice` says who sees its results."""
 
     id: str
     name: str
@@ -74,7 +74,7 @@ class Method(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Account(msgspec.Struct, frozen=True, kw_only=True):
-    """Whose token it is; without a `split` it is for all."""
+    """The owner of a token; without a `split` it is valid for all."""
 
     team: str | None
     token: str
@@ -85,7 +85,7 @@ class Account(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ConfidenceInterval(msgspec.Struct, frozen=True, kw_only=True):
-    """The 95 % confidence interval of a value and of its rank in that column; None if unknown."""
+    """The 95 % interval of a value and of its rank; None if unknown."""
 
     low: float | None = None
     high: float | None = None
@@ -94,11 +94,10 @@ class ConfidenceInterval(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
-    """One row of a board: scores by their names, None where a TTC range has no value.
+    """A row of a board: scores by name, None where a TTC range has no value.
 
-    `id` names the row, also after a change of names: a method's id, or `published:deep-scale`. `decimals` are
-    those that its values are printed with. `pseudonym` is that of an anonymous row of one's own team, which
-    others see under it; else None.
+    `id` is permanent: a method's id, or `published:deep-scale`. `decimals` are those of its values.
+    `pseudonym` is the name that others see for an anonymous row of the own team, else None.
     """
 
     method: str
@@ -115,15 +114,15 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     intervals: dict[str, ConfidenceInterval] = {}
 
     def interval(self, score: str) -> ConfidenceInterval:
-        """The interval of one score; without ends if it was not asked for or is unknown."""
+        """Return the interval of one score, without ends if unknown."""
         return self.intervals.get(score, ConfidenceInterval())
 
 
 class Board(msgspec.Struct, frozen=True, kw_only=True):
     """The ranked entries of a split in an edition.
 
-    `floor` are the scores of the ground truth itself. `unit` is what its intervals and ranks take as
-    independent, `n_units` how many there are.
+    `floor` are the ground truth's own scores, `unit` and `n_units` the independent units of intervals and
+    ranks.
     """
 
     split: str
@@ -143,12 +142,12 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def updated(self) -> str:
-        """When it last changed, to the second; empty where nothing is known."""
+        """The time of its last change, to the second; empty if unknown."""
         return re.sub(r"\.\d+", "", self.updated_at or "")
 
 
 class RankChange(msgspec.Struct, frozen=True, kw_only=True):
-    """Another row of a board, whose rank changes."""
+    """Another row whose rank changes."""
 
     method: str
     rank_before: int | None = None
@@ -156,7 +155,7 @@ class RankChange(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BoardPreview(msgspec.Struct, frozen=True, kw_only=True):
-    """One split's board as it would be: its row before (None: there is none) and after, and who moves."""
+    """A split's future board: its row before (None without one) and after, and the rank changes."""
 
     split: str
     after: BoardEntry
@@ -166,7 +165,7 @@ class BoardPreview(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Foreseen(msgspec.Struct, frozen=True, kw_only=True):
-    """A preview of what everybody would see of a method."""
+    """A preview of a method's public rows."""
 
     name: str
     document: JSON
@@ -182,7 +181,7 @@ class Pair(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Compared(msgspec.Struct, frozen=True, kw_only=True):
-    """Methods of a board side by side; `reason` says why there are no intervals where there are none."""
+    """A comparison of methods; `reason` explains missing intervals."""
 
     document: JSON
     split: str = ""
@@ -195,13 +194,13 @@ class Compared(msgspec.Struct, frozen=True, kw_only=True):
     n_units: int | None = None
 
     def differences(self) -> dict[str, Difference]:
-        """The differences of the first pair that exist, by score name."""
+        """The differences of the first computed pair, by score name."""
         by_name = (self.pairs[0].differences or {}) if self.pairs else {}
         return {name: difference for name, difference in by_name.items() if difference is not None}
 
 
 class Quota(msgspec.Struct, frozen=True, kw_only=True):
-    """The submissions that the own team has left on a split; None is without limit."""
+    """The own team's remaining submissions on a split; None is without limit."""
 
     split: str
     document: JSON
@@ -213,12 +212,12 @@ class Quota(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ClientError(Exception):
-    """The leaderboard did not give what was asked for."""
+    """A failure of a request."""
 
 
 @dataclass(kw_only=True, eq=False)
 class Unreachable(ClientError):
-    """No whole answer came: nothing listens, the name is unknown, the connection was cut, time ran out."""
+    """An incomplete answer: nothing listens, the name is unknown, the connection broke, time ran out."""
 
     url: str
     reason: str
@@ -230,7 +229,7 @@ class Unreachable(ClientError):
 
 @dataclass(kw_only=True, eq=False)
 class Refused(ClientError):
-    """The server answered with an error status. `problems` are listed where the server gave any."""
+    """An error status with the server's `problems`."""
 
     url: str
     status: int
@@ -247,10 +246,9 @@ class Refused(ClientError):
 
 @dataclass(kw_only=True, eq=False)
 class BadAnswer(ClientError):
-    """An answer that is no leaderboard's: not JSON, not of the documented shape, or a redirect.
+    """An answer that is not a leaderboard's: not JSON, of another shape, or a redirect."""
 
-    A redirect is not followed: a token goes only where its owner sends it.
-    """
+    # Following a redirect could send the token to another server.
 
     url: str
     content: str
@@ -261,7 +259,7 @@ class BadAnswer(ClientError):
 
 @dataclass(kw_only=True, eq=False)
 class TimedOut(ClientError):
-    """The workers did not finish in time; `submission` is the last state that the server gave."""
+    """The end of a wait for the workers; `submission` is the last known state."""
 
     what: str
     timeout_s: float

@@ -1,12 +1,11 @@
-"""The leaderboard's API from a laptop or a CI job.
+"""A client of the leaderboard's API, for a laptop or a CI job.
 
     with Client(url="https://example.org", token=token) as client:
         submission = client.submit(data, filename="predictions.json", split="val", method="Foo++")
         for submission in client.watch(submission.id, timeout_s=600):
             print(submission.state)
 
-Every failure is an `answers.ClientError` that states facts. Sending is safe to repeat: bytes that the server
-has get their first submission as answer.
+Every failure is an `answers.ClientError`. Submitting the same bytes again returns their first submission.
 """
 
 from __future__ import annotations
@@ -54,13 +53,13 @@ N_EARLY_LOOKS, EARLY_LOOK_S = 4, 0.2
 
 
 def _certificates(url: str) -> ssl.SSLContext | bool:
-    """What a connection trusts: nothing where there is no TLS, since reading all certificates takes 40 ms."""
+    # Reading all certificates takes 40 ms, so plain HTTP loads none.
     return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT) if urlsplit(url).scheme == "http" else True
 
 
 @dataclass(kw_only=True)
 class Client:
-    """A connection to one leaderboard. `timeout_s` bounds each wait for the network, not the whole."""
+    """A connection to one leaderboard; `timeout_s` limits each wait for the network."""
 
     url: str
     token: str | None = field(default=None, repr=False)
@@ -96,7 +95,7 @@ class Client:
         self.splits()
 
     def splits(self) -> list[str]:
-        """The names of the splits, asked without the token."""
+        """List the names of the splits; the token is not sent."""
         try:
             response = self._asked_by_anybody("splits", accept="application/json")
         except Refused as refused:
@@ -109,7 +108,7 @@ class Client:
         return [str(name) for name in names]
 
     def account(self) -> Account:
-        """Whose token this is."""
+        """Fetch the account of the token."""
         return self._get(Account, "account")
 
     def submit(
@@ -121,7 +120,7 @@ class Client:
         method: str,
         details: Mapping[str, str] | None = None,
     ) -> Submission:
-        """Send a prediction file; gives the new submission, or the first one of the same bytes."""
+        """Submit a prediction file; returns the new submission, or the first one of the same bytes."""
         fields = {"split": split, "method": method, **(details or {})}
         n_sent = 0
 
@@ -140,7 +139,7 @@ class Client:
         return one(response, Submission, is_new=is_new)
 
     def submission(self, submission_id: str) -> Submission:
-        """The present state of a submission."""
+        """Fetch the state of a submission."""
         return self._get(Submission, "submissions", submission_id)
 
     def board(
@@ -152,7 +151,7 @@ class Client:
         at: str | None = None,
         has_intervals: bool = False,
     ) -> Board:
-        """The board of a split: the present one, of an `edition`, or as of `at` (a date or an ISO time)."""
+        """Fetch the board of a split: current, of an `edition`, or as of `at` (a date or an ISO time)."""
         edition_path = [] if edition is None else ["editions", str(edition)]
         asked = {"sort": sort, "at": at, "intervals": "1" if has_intervals else None}
         params = {name: value for name, value in asked.items() if value}
@@ -167,7 +166,7 @@ class Client:
         at: str | None = None,
         has_intervals: bool = False,
     ) -> str:
-        """This very board as the site exports it, for everybody, as "csv" or "bib"."""
+        """Download the public export of this board, as "csv" or "bib"."""
         is_of_edition = board.edition is not None and not at
         path = f"{quote(board.split, safe='')}{f'/editions/{board.edition}' if is_of_edition else ''}"
         asked = {"sort": sort, "at": at, "intervals": "1" if has_intervals else None}
@@ -175,16 +174,16 @@ class Client:
         return self._retry(lambda: self._http.get(f"{self.url}/board/{path}.{suffix}", params=params)).text
 
     def manifest(self, split: str, *, edition: int | None = None) -> bytes:
-        """The manifest of a split, or of an edition of it: all columns but the values."""
+        """Download the manifest of a split or edition: all columns except the true times."""
         query = {} if edition is None else {"edition": edition}
         return self._asked_by_anybody("splits", split, "manifest", accept="text/csv, */*", **query).content
 
     def quota(self) -> list[Quota]:
-        """The submissions that the own team has left, by split."""
+        """Fetch the remaining submissions of the own team, by split."""
         return rows(self._asked("quota"), Quota)
 
     def compare(self, split: str, methods: Sequence[str], *, timeout_s: float = 120.0) -> Compared:
-        """Methods of a split's board, by id; asked for until workers have compared them."""
+        """Compare methods of a split's board by id; asks until workers have computed the comparison."""
         until_s = self.monotonic_s() + timeout_s
         params = {"split": split, "m": list(methods)}
         address, n_asked = self._address("compare"), 0
@@ -201,56 +200,54 @@ class Client:
             self.sleep(delay_s)
 
     def own_method(self, name_or_id: str) -> Method | None:
-        """The method of one's own team of that name or id."""
+        """Fetch the own team's method with this name or id."""
         return next((row for row in self.methods() if name_or_id in {row.id, row.name}), None)
 
     def methods(self) -> Iterator[Method]:
-        """The methods of one's own team by name."""
+        """Fetch the own team's methods by name."""
         return self._listed(Method, "methods")
 
     def submissions(self) -> Iterator[Submission]:
-        """The submissions of one's own team, newest first."""
+        """List the own team's submissions, newest first."""
         return self._listed(Submission, "submissions")
 
     def file(self, submission_id: str) -> bytes:
-        """The file of a submission of one's own team, as it was sent."""
+        """Download the file of an own submission as it was sent."""
         return self._asked("submissions", submission_id, "file").content
 
     def withdraw(self, submission_id: str) -> Submission:
-        """Withdraw a submission of one's own team, or cancel it; there is no way back."""
+        """Withdraw or cancel an own submission, for good."""
         address = self._address("submissions", submission_id, "withdraw")
         return one(self._retry(lambda: self._http.post(address)), Submission)
 
     def method(self, method_id: str) -> Method:
-        """A method, as one may see it."""
+        """Fetch a method as this account may see it."""
         return self._get(Method, "methods", method_id)
 
     def foreseen(self, method_id: str, visibility: str) -> Foreseen:
-        """Preview what everybody would see of an own method if it were "PUBLIC" or "ANONYMOUS"."""
+        """Preview what everyone would see of an own method if it were "PUBLIC" or "ANONYMOUS"."""
         return self._get(Foreseen, "methods", method_id, "visibility", params={"as": visibility})
 
     def show_method(self, method_id: str, visibility: str, *, reveal_at: str | None = None) -> Method:
-        """Show a method to everybody, "PUBLIC" or, until `reveal_at`, "ANONYMOUS"; there is no way back."""
+        """Publish a method as "PUBLIC" or, until `reveal_at`, "ANONYMOUS", for good."""
         address = self._address("methods", method_id, "visibility")
         body = {"visibility": visibility, "confirm": True, "reveal_at": reveal_at}
         return one(self._retry(lambda: self._http.post(address, json=body)), Method)
 
     def receipt(self, submission_id: str) -> bytes:
-        """The signed receipt of a scored submission, a JSON Web Token as it came."""
+        """Download the signed receipt of a scored submission, a JSON Web Token."""
         return self._asked("submissions", submission_id, "receipt").content
 
     def receipt_keys(self) -> bytes:
-        """The keys that sign the site's receipts, or once did: a JSON Web Key Set."""
+        """Download the site's present and former receipt keys, a JSON Web Key Set."""
         address = f"{self.url}/.well-known/tsttc-receipt-keys.json"
         return self._retry(lambda: self._http.get(address)).content
 
     def watch(self, submission_id: str, *, timeout_s: float) -> Iterator[Submission]:
-        """Ask until the submission is final and has its intervals, giving every answer.
+        """Yield each state of a submission until it is final and has its intervals.
 
-        For the intervals it waits `INTERVALS_WITHIN_S` at most: workers make them when no submission waits.
-        The server says when to ask again. Most files are scored within a second, so the first looks
-        come soon. A server that is away or busy is asked less and less often. Raises TimedOut after
-        `timeout_s` seconds; of the other errors only those that waiting cannot cure.
+        Waits at most `INTERVALS_WITHIN_S` for intervals. Raises TimedOut after `timeout_s` seconds, and at
+        once the errors that a retry cannot cure.
         """
         until_s = self.monotonic_s() + timeout_s
         last: Submission | None = None
@@ -290,7 +287,6 @@ class Client:
         return again_s or self.retry_policy.delay_s(n_failed=n_same, retry_after_s=None, rng=self.rng)
 
     def _listed(self, kind: type[T], *path: str) -> Iterator[T]:
-        """The rows of a list, page after page."""
         params: Mapping[str, str] = {}
         while True:
             response = self._retry(partial(self._http.get, self._address(*path), params=params))
@@ -306,7 +302,7 @@ class Client:
         return self._retry(lambda: self._http.get(self._address(*path), params=params))
 
     def _asked_by_anybody(self, *path: str, accept: str, **query: int) -> httpx.Response:
-        """Read public pages without the token, which may lack the right to read."""
+        # Without the token, which may lack the right to read.
         headers = {"Accept": accept}
         request = self._http.build_request("GET", self._address(*path), params=query, headers=headers)
         request.headers.pop("Authorization", None)
@@ -316,7 +312,6 @@ class Client:
         return "/".join([self.url, "api/v1", *(quote(part, safe="") for part in path)])
 
     def _checked(self, send: Callable[[], httpx.Response]) -> httpx.Response:
-        """As `checked`; remembers that the server is one that answers."""
         try:
             response = checked(send, url=self.url)
         except Unreachable as fault:
@@ -329,7 +324,6 @@ class Client:
         return response
 
     def _retry(self, send: Callable[[], httpx.Response]) -> httpx.Response:
-        """Send until answered, as often as the retry policy allows, as long as trying again makes sense."""
         n_failed = 0
         while True:
             try:

@@ -20,7 +20,7 @@ QUOTA_EXCEEDED = "quota-exceeded"  # when to come back is for a person to decide
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetryPolicy:
-    """How often and how long to try again: a quarter of a minute, as for a restart of the server."""
+    """The limits of retrying: a quarter of a minute, enough for a restart of the server."""
 
     n_tries: int = 9
     n_first_tries: int = 8  # where nothing has ever answered
@@ -31,12 +31,12 @@ class RetryPolicy:
     jitter: float = 0.2
 
     def delay_s(self, *, n_failed: int, retry_after_s: float | None, rng: random.Random) -> float:
-        """Seconds to wait after `n_failed` tries (from 1); never less than the server asked for."""
+        """Return the seconds to wait after `n_failed` tries (from 1), at least those of the server."""
         grown = min(self.longest_delay_s, self.first_delay_s * self.factor ** (n_failed - 1))
         return max(grown * (1 - self.jitter * rng.random()), retry_after_s or 0.0)
 
     def may_pass(self, fault: Refused) -> bool:
-        """Whether the same request may be answered otherwise within a bearable time."""
+        """Return whether a retry may succeed within a bearable time."""
         if fault.code == QUOTA_EXCEEDED:
             return False
         if fault.status == httpx.codes.TOO_MANY_REQUESTS and fault.retry_after_s is None:
@@ -46,7 +46,6 @@ class RetryPolicy:
 
 
 def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
-    """The response, if it is one of success; raises ClientError."""
     try:
         response = send()
     except (httpx.InvalidURL, UnicodeError) as error:  # a host that no name system could know
@@ -65,7 +64,6 @@ def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:
-    """Seconds from a Retry-After header, None where it is absent or no number."""
     value = headers.get("retry-after", "").strip()
     return float(value) if value.isascii() and value.isdigit() else None
 
@@ -77,7 +75,7 @@ def _reason(error: httpx.TransportError | httpx.DecodingError) -> str:
 
 
 def _refused(response: httpx.Response) -> Refused:
-    """Read an error answer leniently: a proxy may have written it."""
+    # Lenient, because a proxy may have written the answer.
     try:
         document = msgspec.json.decode(response.content)
     except msgspec.DecodeError:
@@ -105,7 +103,6 @@ def _text(value: object) -> str:
 
 
 def decoded(response: httpx.Response) -> object:
-    """The JSON of an answer. Raises BadAnswer."""
     try:
         return msgspec.json.decode(response.content)
     except msgspec.DecodeError:
@@ -114,7 +111,7 @@ def decoded(response: httpx.Response) -> object:
 
 
 def one(response: httpx.Response, kind: type[T], **more: object) -> T:
-    """The JSON answer as `kind`, with the whole of it as its `document`. Raises BadAnswer."""
+    """Decode an answer as `kind`, with the JSON as its `document`. Raises BadAnswer."""
     url, document = str(response.url), decoded(response)
     if not isinstance(document, dict):
         raise BadAnswer(url=url, content="JSON, but no object")
@@ -122,7 +119,7 @@ def one(response: httpx.Response, kind: type[T], **more: object) -> T:
 
 
 def rows(response: httpx.Response, kind: type[T]) -> list[T]:
-    """The JSON answer as a list of `kind`. Raises BadAnswer."""
+    """Decode an answer as a list of `kind`. Raises BadAnswer."""
     url, document = str(response.url), decoded(response)
     if not isinstance(document, list):
         raise BadAnswer(url=url, content="JSON, but no list")
@@ -130,7 +127,8 @@ def rows(response: httpx.Response, kind: type[T]) -> list[T]:
 
 
 def next_page(response: httpx.Response) -> Mapping[str, str]:
-    """The query of the next page, empty on the last; of `Link` nothing else, so that the token stays here."""
+    """Return the query of the next page, empty on the last."""
+    # The rest of `Link` is ignored, so that the token stays on this server.
     link = response.links.get("next", {}).get("url", "")
     try:
         return dict(httpx.URL(link).params)
@@ -139,7 +137,6 @@ def next_page(response: httpx.Response) -> Mapping[str, str]:
 
 
 def _converted(document: object, kind: type[T], *, url: str, **more: object) -> T:
-    """`document` as `kind`; a struct gets the whole of it as its member `document`."""
     value = document
     if isinstance(document, dict) and hasattr(kind, "__struct_fields__"):
         value = {**document, "document": document, **more}

@@ -1,8 +1,6 @@
-"""Protocols: the frozen, named rule sets by which predictions become numbers, and the names of these numbers.
+"""Protocols: frozen, named rule sets that turn predictions into numbers, and the names of these numbers."""
 
-A change of any rule is a new protocol name; an existing one never changes. Whatever shows an edition asks
-the edition's protocol which metrics and TTC ranges there are, and here what they are called.
-"""
+# A changed rule gets a new protocol name. Code that shows an edition reads metrics and TTC ranges from here.
 
 from __future__ import annotations
 
@@ -25,7 +23,7 @@ _NAME: Final = re.compile(r"[a-z][a-z0-9]*")
 
 @dataclass(frozen=True, slots=True)
 class TTCRange:
-    """A TTC range: true times to contact in seconds, closed at both ends as in the dataset's toolkit."""
+    """A TTC range: true times to contact in seconds, closed at both ends."""
 
     name: str
     low_s: float
@@ -38,7 +36,7 @@ class TTCRange:
 
     @property
     def ends(self) -> str:
-        """Its ends, without their unit.
+        """Both ends, without their unit.
 
         >>> [ttc_range.ends for ttc_range in TTC_RANGES]
         ['0–3', '3–6', '6–20', '−20–0']
@@ -47,7 +45,7 @@ class TTCRange:
 
     @property
     def seconds(self) -> str:
-        """Its ends as a text, such as "0–3 s"."""
+        """Both ends with their unit, such as "0–3 s"."""
         return f"{self.ends} s"
 
 
@@ -61,7 +59,7 @@ TTC_RANGES: Final = (
 
 
 def score_name(metric: str, ttc_range: str) -> str:
-    """The name of a score: a metric's alone is that of the overall one.
+    """Return the name of a score; an overall score has the name of its metric.
 
     >>> score_name("mid", "overall"), score_name("mid", "crucial")
     ('mid', 'mid_crucial')
@@ -70,7 +68,7 @@ def score_name(metric: str, ttc_range: str) -> str:
 
 
 def split_name(name: str) -> tuple[str, str]:
-    """The names of the metric and the TTC range of a score: the inverse of `score_name`.
+    """Split a score's name into metric and TTC range, the inverse of `score_name`.
 
     >>> split_name("mid"), split_name("mid_crucial")
     (('mid', 'overall'), ('mid', 'crucial'))
@@ -81,15 +79,15 @@ def split_name(name: str) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Protocol:
-    """The rules by which predicted times to contact become scores.
+    """The rules by which predicted times to contact (seconds) become scores.
 
-    Predictions outside [−limit_s, limit_s] are truncated to its ends. With `near_zero_s = (low, high)`,
-    predictions in (low, 0) become `low` and those in (0, high) become `high`; with None they stay, and those
-    for which MiD is undefined are rejected. NaN and 0 are always rejected.
-
-    There is a score for each of `metrics`, overall and in each of `ranges`. A name of either means the
-    same in every protocol. The first metric is MiD, which boards rank by.
+    Predictions are truncated to [−limit_s, limit_s]. With `near_zero_s = (low, high)`, those in (low, 0)
+    become `low` and those in (0, high) become `high`; with None, those without a defined MiD are rejected.
+    NaN and 0 are always rejected. Each of `metrics` has a score overall and in each of `ranges`; the first
+    metric is MiD.
     """
+
+    # A metric or range has the same meaning in every protocol that names it.
 
     name: str
     limit_s: float
@@ -98,7 +96,6 @@ class Protocol:
     metrics: tuple[Metric, ...] = (MID, RTE)
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` for names that scores cannot have, and where MiD is not the first metric."""
         names = [*self.overall_names, *(ttc_range.name for ttc_range in self.ranges)]
         if not all(map(_NAME.fullmatch, names)) or len({*names, OVERALL}) <= len(names):
             raise ValueError(f"Names of metrics and TTC ranges are words, each once; found {names}.")
@@ -107,22 +104,22 @@ class Protocol:
 
     @property
     def boundaries(self) -> dict[str, float]:
-        """The values that truncation can produce, ascending, under the names that reports use."""
+        """The values that truncation can produce, ascending, by name in reports."""
         values = (-self.limit_s, *(self.near_zero_s or ()), self.limit_s)
         return {f"{value:g}": value for value in values}
 
     @cached_property
     def range_names(self) -> tuple[str, ...]:
-        """`overall`, then the TTC ranges in the protocol's order."""
+        """`overall`, then the TTC ranges in order."""
         return (OVERALL, *(ttc_range.name for ttc_range in self.ranges))
 
     @cached_property
     def score_names(self) -> tuple[str, ...]:
-        """The numbers of a result in the order of their columns: `mid`, `mid_crucial`, …, `rte_negative`."""
+        """The names of scores in column order: `mid`, `mid_crucial`, …, `rte_negative`."""
         return tuple(score_name(m.name, ttc_range) for m in self.metrics for ttc_range in self.range_names)
 
     def names_of(self, metric: str) -> tuple[str, ...]:
-        """The scores of one metric; all of them where there is no metric of this name."""
+        """Return the scores of one metric, all scores for an unknown metric."""
         return tuple(name for name in self.score_names if split_name(name)[0] == metric) or self.score_names
 
     @property
@@ -132,7 +129,7 @@ class Protocol:
 
     @property
     def decimals(self) -> int:
-        """With how many decimals its numbers are shown where no edition says otherwise."""
+        """The default number of decimals."""
         return max(metric.decimals for metric in self.metrics)
 
 
@@ -151,7 +148,7 @@ SCORE_NAMES: Final = PROTOCOLS[DEFAULT_PROTOCOL].score_names
 
 
 def get_protocol(name: str) -> Protocol:
-    """The protocol called `name`; raises `ValueError` naming those that exist.
+    """Return the protocol with this name; raises `ValueError` that lists the names.
 
     >>> get_protocol("tsttc-1").boundaries
     {'-20': -20.0, '-0.15': -0.15, '0.05': 0.05, '20': 20.0}
@@ -166,13 +163,13 @@ def get_protocol(name: str) -> Protocol:
 
 
 def metric_of(name: str) -> Metric:
-    """The metric of a score. One that only a newer server knows has its name for a symbol, and no unit."""
+    """Return the metric of a score; an unknown one has its name as symbol and no unit."""
     wanted, _ = split_name(name)
     return known_metrics().get(wanted) or Metric(wanted, wanted, "", wanted, 2, MID.function)
 
 
 def column_words(name: str) -> str:
-    """A score in a sentence.
+    """Name a score in a sentence.
 
     >>> column_words("mid"), column_words("rte_crucial")
     ('MiD', 'RTE on crucial')
@@ -182,22 +179,20 @@ def column_words(name: str) -> str:
 
 
 def range_of(name: str) -> TTCRange | None:
-    """The TTC range of a score; None for an overall one, and for one that only a newer server knows."""
+    """Return the TTC range of a score, None for an overall or unknown one."""
     return known_ranges().get(split_name(name)[1])
 
 
 def known_ranges() -> dict[str, TTCRange]:
-    """The TTC ranges of all protocols by their names."""
     return {ttc_range.name: ttc_range for protocol in PROTOCOLS.values() for ttc_range in protocol.ranges}
 
 
 def known_metrics() -> dict[str, Metric]:
-    """The metrics of all protocols by their names."""
     return {metric.name: metric for protocol in PROTOCOLS.values() for metric in protocol.metrics}
 
 
 def known_names() -> tuple[str, ...]:
-    """The names of the scores of all protocols, in an order that is each one's own as well."""
+    """Return the names of scores of all protocols, each protocol's order kept."""
     there = {name for protocol in PROTOCOLS.values() for name in protocol.score_names}
     ranges = (OVERALL, *known_ranges())
     named = (score_name(metric, ttc_range) for metric in known_metrics() for ttc_range in ranges)
@@ -205,11 +200,7 @@ def known_names() -> tuple[str, ...]:
 
 
 def grouped_names(names: Iterable[str]) -> dict[Metric, list[str]]:
-    """Names of scores by their metrics, both in the order in which they come.
-
-    >>> {metric.symbol: names for metric, names in grouped_names(["mid", "mid_small", "rte"]).items()}
-    {'MiD': ['mid', 'mid_small'], 'RTE': ['rte']}
-    """
+    """Group the names of scores by metric, in the given order."""
     groups: dict[Metric, list[str]] = {}
     for name in names:
         groups.setdefault(metric_of(name), []).append(name)

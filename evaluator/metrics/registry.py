@@ -1,8 +1,9 @@
-"""Metrics: errors of single sequences, arrays in, arrays out; what to call them everywhere; ranks.
+"""Metrics: errors of single sequences, their names and units, and ranks.
 
-To add one, define it here and name it in a protocol of `protocol.py`; everything else asks there. Nothing
-here imports numpy before an error is taken, so that `tsttc --help` need not load it.
+To add one, define it here and name it in a protocol of `protocol.py`.
 """
+
+# numpy is imported late: `tsttc --help` answers without it.
 
 from __future__ import annotations
 
@@ -19,11 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """The input of a metric: float64 arrays of one shape, one item for each sequence.
-
-    `true_log_scale_ratio` is ln α₁₀(τ) by `scale.exact_log`; a `GroundTruth` keeps it. Predictions are taken
-    as they are: truncation is the protocol's business.
-    """
+    """The input of a metric: float64 arrays of one shape; `true_log_scale_ratio` is ln α₁₀(τ)."""
 
     predicted_ttc_s: Floats
     true_ttc_s: Floats
@@ -32,7 +29,6 @@ class Terms:
 
     @classmethod
     def of(cls, predicted_ttc_s: ArrayLike, true_ttc_s: ArrayLike) -> Terms:
-        """The terms of these times to contact, whose shapes broadcast."""
         import numpy as np  # noqa: PLC0415 -- as the docstring above says
 
         from evaluator.arrays import as_floats  # noqa: PLC0415 -- loads numpy
@@ -44,10 +40,10 @@ class Terms:
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """An error of a prediction: 0 or more and finite, lower is better; a score is its mean.
+    """An error of a prediction: at least 0 and finite, lower is better; a score is its mean.
 
-    `name` (lower-case letters and digits) is what scores carry, `symbol` what tables show, `unit` as it
-    stands in brackets behind the symbol. `decimals` are those that are shown where no edition says otherwise.
+    `name` (lower-case letters, digits) is part of score names; tables show `symbol` and `unit`; `decimals` is
+    the default of editions.
     """
 
     name: str
@@ -58,7 +54,7 @@ class Metric:
     function: Callable[[Terms], Floats]
 
     def errors(self, predicted_ttc_s: ArrayLike, true_ttc_s: ArrayLike) -> Floats:
-        """The errors of these predictions, whose shapes broadcast; NaN where they are undefined.
+        """Compute the errors of predictions (seconds, shapes broadcast); NaN where undefined.
 
         >>> round(float(MID.errors(5.0, 4.0)), 6), float(RTE.errors(5.0, 4.0))
         (48.899805, 25.0)
@@ -67,16 +63,12 @@ class Metric:
 
     @property
     def heading(self) -> str:
-        """Symbol and unit, as over a column.
-
-        >>> MID.heading, RTE.heading
-        ('MiD ×10⁻⁴', 'RTE %')
-        """
+        """Symbol and unit, such as "RTE %"."""
         return f"{self.symbol} {self.unit}".rstrip()
 
     @property
     def unit_of_value(self) -> str:
-        """The unit that follows a value in a sentence, with its space; empty for a power of ten.
+        """The unit after a value in a sentence, with its space; empty for a power of ten.
 
         >>> MID.unit_of_value, RTE.unit_of_value
         ('', ' %')
@@ -85,16 +77,14 @@ class Metric:
 
     @property
     def unit_of_difference(self) -> str:
-        """The same behind the difference of two values."""
+        """The unit after a difference of two values."""
         return " percentage points" if self.unit == "%" else self.unit_of_value
 
 
 def _motion_in_depth_error(terms: Terms) -> Floats:
-    """MiD = |ln α₁₀(τ) − ln α₁₀(τ̂)| · 10⁴; NaN where α₁₀ is not positive.
-
-    numpy's logarithm is fast, but on some processors the last bit differs from the C library's. Where the two
-    logarithms nearly cancel that bit would show, so there the C library's is taken.
-    """
+    """Compute MiD = |ln α₁₀(τ) − ln α₁₀(τ̂)| · 10⁴; NaN where α₁₀ is not positive."""
+    # numpy's logarithm is fast, but its last bit depends on the processor. Where the two logarithms nearly
+    # cancel, that bit shows, so the C library's is used there.
     import numpy as np  # noqa: PLC0415 -- as the docstring above says
 
     from evaluator.metrics.scale import exact_log  # noqa: PLC0415 -- loads numpy
@@ -115,7 +105,7 @@ def _motion_in_depth_error(terms: Terms) -> Floats:
 
 
 def _relative_ttc_error(terms: Terms) -> Floats:
-    """RTE = |(τ̂ − τ) / τ| · 100 %."""
+    """Compute RTE = |(τ̂ − τ) / τ| · 100 %."""
     import numpy as np  # noqa: PLC0415 -- as the docstring above says
 
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -131,7 +121,7 @@ RTE: Final = Metric("rte", "RTE", "%", "Relative TTC error", 2, _relative_ttc_er
 
 
 def rank(values: Sequence[float | None]) -> list[int | None]:
-    """Competition ranks 1, 2, 2, 4: equal values share the rank, the next one counts those before it.
+    """Rank values as 1, 2, 2, 4: equal values share a rank; None has none.
 
     >>> rank([14.8, 14.3, None, 14.8, 40.5])
     [2, 1, None, 2, 4]
@@ -143,7 +133,7 @@ def rank(values: Sequence[float | None]) -> list[int | None]:
 
 
 def best_and_second(values: Sequence[float | None]) -> tuple[frozenset[int], frozenset[int]]:
-    """Indices of the smallest and of the second smallest distinct value of one column; ties share the mark.
+    """Return the indices of the smallest and of the second smallest distinct value, ties included.
 
     >>> best, second = best_and_second([14.8, 14.3, None, 14.8])
     >>> sorted(best), sorted(second)

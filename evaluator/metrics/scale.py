@@ -1,8 +1,8 @@
-"""Time to contact and scale ratio: two ways to say the same thing.
+"""Time to contact and scale ratio: conversions between them.
 
-τ is in seconds and measured from the target (last) frame, as in the dataset's toolkit. The scale ratio α is
-the object's size in the reference frame over its size in the target frame at the pair rate f = 10 Hz / frame
-gap; α < 1 is an approaching object. All functions are elementwise on float64 and accept scalars and arrays.
+τ is in seconds from the target (last) frame. The scale ratio α is the object's size in the reference frame
+over its size in the target frame, at the pair rate f = 10 Hz / frame gap; α < 1 approaches. All functions are
+elementwise in float64, for scalars and arrays.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ N_FRAMES: Final = 6
 
 
 def fps_of_gap(frame_gap: ArrayLike) -> Floats:
-    """The pair rate in Hz of two frames that lie `frame_gap` frames apart.
+    """Return the rate in Hz of a pair of frames `frame_gap` frames apart.
 
     >>> float(fps_of_gap(5))
     2.0
@@ -32,7 +32,7 @@ def fps_of_gap(frame_gap: ArrayLike) -> Floats:
 
 
 def scale_ratio_to_ttc(scale_ratio: ArrayLike, *, fps_hz: ArrayLike) -> Floats:
-    """τ = 1 / (f · (1/α − 1)) in seconds, for α > 0. α = 1, an object that keeps its size, gives +∞.
+    """Convert α > 0 to τ = 1 / (f · (1/α − 1)) in seconds; α = 1 (constant size) gives +∞.
 
     >>> float(scale_ratio_to_ttc(0.8, fps_hz=2))
     2.0
@@ -45,7 +45,7 @@ def scale_ratio_to_ttc(scale_ratio: ArrayLike, *, fps_hz: ArrayLike) -> Floats:
 
 
 def ttc_to_scale_ratio(ttc_s: ArrayLike, *, fps_hz: ArrayLike) -> Floats:
-    """α = 1 / (1 / (f · τ) + 1), the exact inverse of `scale_ratio_to_ttc`; τ = ±∞ gives 1.
+    """Convert τ in seconds to α = 1 / (1 / (f · τ) + 1), the inverse of `scale_ratio_to_ttc`; ±∞ gives 1.
 
     >>> float(ttc_to_scale_ratio(2.0, fps_hz=2))
     0.8
@@ -56,7 +56,7 @@ def ttc_to_scale_ratio(ttc_s: ArrayLike, *, fps_hz: ArrayLike) -> Floats:
 
 
 def convert_rate(scale_ratio: ArrayLike, *, from_fps_hz: ArrayLike, to_fps_hz: ArrayLike) -> Floats:
-    """α_m = 1 / ((f_n / f_m) · (1/α_n − 1) + 1): the same τ as a scale ratio at another rate.
+    """Convert a scale ratio to another rate: α_m = 1 / ((f_n / f_m) · (1/α_n − 1) + 1).
 
     >>> round(float(convert_rate(0.8, from_fps_hz=2, to_fps_hz=10)), 6)
     0.952381
@@ -68,9 +68,9 @@ def convert_rate(scale_ratio: ArrayLike, *, from_fps_hz: ArrayLike, to_fps_hz: A
 
 
 def scale_ratio_10hz(ttc_s: ArrayLike) -> Floats:
-    """α₁₀(τ) = 1 / ((1/(τ·10) + 1) + 10⁻⁶), the scale ratio inside MiD, in the toolkit's order of operations.
+    """Compute MiD's α₁₀(τ) = 1 / ((1/(τ·10) + 1) + 10⁻⁶), in the toolkit's order of operations.
 
-    Not positive, or not finite, for τ in about (−0.1, 0]: there MiD is undefined.
+    Neither positive nor finite for τ in about (−0.1, 0], where MiD is undefined.
 
     >>> round(float(scale_ratio_10hz(2.0)), 9)
     0.952380045
@@ -86,7 +86,7 @@ def scale_ratio_10hz(ttc_s: ArrayLike) -> Floats:
 
 
 def exact_log(values: Floats) -> Floats:
-    """The C library's natural logarithm, as the dataset's toolkit takes it; NaN where it has none."""
+    """Compute the C library's natural logarithm, as the dataset's toolkit does; NaN where undefined."""
     with np.errstate(invalid="ignore"):
         positive = values > 0
     logs = np.full(values.shape, math.nan)

@@ -1,9 +1,9 @@
-"""All tables of the paper of 2023: main results, ablations, cameras, scripts, as printed.
+"""All tables of the paper of 2023, as printed.
 
     table = published_tables().table("ablation-frame-gap")
     table.value(method="pixel-mse", setting=5, column="mid")  # 41.0
 
-Values are those that the paper prints; where it contradicts itself, the notes of the table say so.
+The notes of a table name contradictions of the paper.
 """
 
 from __future__ import annotations
@@ -18,10 +18,7 @@ Setting = bool | int | float | str | None
 
 
 class PublishedRow(msgspec.Struct, frozen=True):
-    """One row: `values` go with the table's columns. An ablation's row is of a `method` at a `setting`.
-
-    `printed` has the values as the paper prints them, where that is not how a number is written.
-    """
+    """A row: `values` by column of a `method`, and in an ablation of a `setting`."""
 
     key: str | int | float
     values: tuple[Any, ...]
@@ -30,13 +27,11 @@ class PublishedRow(msgspec.Struct, frozen=True):
     setting: Setting = None
     is_default: bool = False
     printed_as: str | None = None
-    printed: tuple[str, ...] | None = None
+    printed: tuple[str, ...] | None = None  # the paper's spelling of `values`, where numbers differ from it
 
 
 class PublishedTable(msgspec.Struct, frozen=True):
-    """One table. `units` are by column, `section` and `caption` the paper's; `is_result` marks the tables of
-    measured numbers. An ablation varies `parameter`.
-    """
+    """A table: `units` by column, the paper's `section` and `caption`, an ablation's `parameter`."""
 
     name: str
     section: str
@@ -44,15 +39,12 @@ class PublishedTable(msgspec.Struct, frozen=True):
     columns: tuple[str, ...]
     units: dict[str, str]
     rows: tuple[PublishedRow, ...]
-    is_result: bool
+    is_result: bool  # of measured numbers
     parameter: str | None = None
     notes: tuple[str, ...] = ()
 
     def value(self, *, method: str, setting: Setting, column: str, split: str = "val") -> float | None:
-        """The number of a method at a setting; None where the paper has none.
-
-        Raises `KeyError` for a column that the table lacks.
-        """
+        """Return a method's number at a setting, None if absent; raises `KeyError` for an unknown column."""
         if column not in self.columns:
             raise KeyError(column)
         for row in self.rows:
@@ -62,7 +54,7 @@ class PublishedTable(msgspec.Struct, frozen=True):
 
 
 class PublishedTables(msgspec.Struct, frozen=True):
-    """The tables of one paper: `source` says which, `metrics` has units, `methods` the printed names."""
+    """The tables of a paper: `source`, `metrics` with units, printed names of `methods`."""
 
     source: dict[str, Any]
     metrics: dict[str, str]
@@ -70,12 +62,12 @@ class PublishedTables(msgspec.Struct, frozen=True):
     tables: tuple[PublishedTable, ...]
 
     def table(self, name: str) -> PublishedTable:
-        """The table of that name; raises `KeyError`."""
+        """Return the table with this name; raises `KeyError`."""
         return {table.name: table for table in self.tables}[name]
 
 
 @cache
 def published_tables() -> PublishedTables:
-    """The tables of "TSTTC: A Large-Scale Dataset for Time-to-Contact Estimation in Driving Scenarios"."""
+    """Load "TSTTC: A Large-Scale Dataset for Time-to-Contact Estimation in Driving Scenarios"."""
     data = files(__package__).joinpath("tables-2023.json").read_bytes()
     return msgspec.json.decode(data, type=PublishedTables)

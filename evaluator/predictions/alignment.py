@@ -33,7 +33,6 @@ class Aligned:
 
 
 def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
-    """Read any file, member by member; raises `Rejected`."""
     # A value and a rate for each sequence, meta, and enough more to name what is too much.
     max_members = 2 * manifest.n_sequences + 100_000
     document = read_document(parse(data, max_members=max_members))
@@ -58,8 +57,6 @@ def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
 
 
 def read_rates(document: Document, manifest: Manifest, findings: Findings) -> Floats:
-    """The pair rates in Hz, (n,) or (); faults are noted."""
-
     def by_key(members: Members, pointer_of: PointerOf, fault: Fault) -> Floats:
         _check_keys(members, manifest, findings, pointer_of)
         return _column(members, manifest, findings, pointer_of, fault)
@@ -70,7 +67,7 @@ def read_rates(document: Document, manifest: Manifest, findings: Findings) -> Fl
 def rates_of(
     document: Document, findings: Findings, by_key: Callable[[Members, PointerOf, Fault], Floats]
 ) -> Floats:
-    """The pair rates in Hz, () or what `by_key` makes of an object of rates; faults are noted."""
+    """Read pair rates in Hz: (), or (n,) by `by_key`."""
     is_gap = document.rate_name == "frame_gap"
     fault = _gap_fault if is_gap else _fps_fault
     name = str(document.rate_name)
@@ -85,7 +82,7 @@ def rates_of(
 
 
 def _check_keys(members: Members, manifest: Manifest, findings: Findings, pointer_of: PointerOf) -> KeyKind:
-    """Note missing, unknown, duplicate and mixed keys; return the kind of most known keys."""
+    """Note missing, unknown, duplicate and mixed keys; return the most frequent kind."""
     by_id, by_natural_key = manifest.row_of_id, manifest.row_of_natural_key
     names = [name for name, _ in members]
     id_names = [name for name in names if name in by_id]
@@ -138,7 +135,7 @@ def column(
     *,
     n: int,
 ) -> Floats:
-    """The values (n,) by the row of each member, NaN where none is given or usable; faults are noted."""
+    """Align values (n,) by the row of each member, NaN where absent or unusable."""
     values = np.full(n, math.nan)
     for (name, value), row in zip(members, rows, strict=True):
         if problem := fault(value):
@@ -149,7 +146,6 @@ def column(
 
 
 def fault_of(unit: Unit) -> Fault:
-    """Code and message for what is no value of this unit."""
     expected = RULES[unit][0].expected
 
     def fault(value: object) -> tuple[str, str] | None:
@@ -182,7 +178,6 @@ def _is_number(value: object) -> TypeGuard[int | float]:
 
 
 def require_once(names: list[str], findings: Findings, pointer_of: PointerOf) -> None:
-    """Note keys that appear more than once."""
     repeated = [name for name, count in Counter(names).items() if count > 1]
     if repeated:
         message = (

@@ -1,17 +1,15 @@
-"""The columnar reading of a prediction file: no Python object per key, no dictionary.
+"""Columnar reading of a prediction file, without a Python object per key.
 
-Keys of a few digits, as machines write them, are compared with the manifest's as 64-bit words, then
-overwritten with spaces, so that a JSON list of numbers remains for a fast parser. Other files are parsed into
-a dictionary. Both ways give what the strict reading (`evaluator.predictions.alignment`) gives, or None where
-it might refuse.
-
-Why the first way is exact. Let n be the number of sequences. It is taken only if (1) the text has n colons,
-(2) the bytes before each are the key of another sequence of the manifest with its quotation marks, (3) each
-key but the first is preceded by a comma and the same white space, the first by `{` and white space, and
-(4) the text with all these keys blanked, and the outer braces turned into brackets, is a JSON list of n
-numbers. By (4) there are n - 1 commas, by (3) each stands directly before a key; so every part between commas
-holds one key, at its front, and one number.
+Keys of a few digits are compared with the manifest's as 64-bit words and overwritten with spaces; the JSON
+list of numbers that remains goes to a fast parser. Other files become a dictionary. The result is that of the
+strict reading (`evaluator.predictions.alignment`), or None where that might refuse.
 """
+
+# Why reading by words is exact, for n sequences. It needs that (1) the text has n colons, (2) the bytes
+# before each are another key of the manifest in its quotation marks, (3) each key but the first follows a
+# comma and the same white space, the first `{` and white space, and (4) the text with keys blanked and the
+# outer braces as brackets is a JSON list of n numbers. By (4) there are n - 1 commas, by (3) each is directly
+# before a key; so every part between commas has one key, at its start, and one number.
 
 from __future__ import annotations
 
@@ -54,7 +52,7 @@ _LIST: Final = msgspec.json.Decoder(list[float])
 
 
 def read_column(data: bytes, manifest: Manifest) -> Aligned | None:
-    """The aligned values of a file without surprises, or None for any other."""
+    """Align a regular file's values, or return None."""
     parts = _split(data.removeprefix(BYTE_ORDER_MARK).strip(_WHITE_SPACE))
     if parts is None:
         return None
@@ -84,7 +82,6 @@ def _rates(document: Document, manifest: Manifest) -> Floats:
 
 
 def _split(text: bytes) -> tuple[bytes, Document] | None:
-    """The object of predictions, which has no further object inside, and the document around it."""
     if text[:1] != b"{" or text[-1:] != b"}":
         return None
     if text.find(b"{", 1) < 0:
@@ -113,10 +110,9 @@ def _split_envelope(text: bytes) -> tuple[bytes, Document] | None:
 
 
 class KeyWords(NamedTuple):
-    """The keys of a manifest as they stand in a file, `"123":`, each in the last bytes of its word; all (n,).
+    """The keys of a manifest as bytes of a file, `"123":`, at the end of 64-bit words; all (n,)."""
 
-    `masks` select these bytes, `lengths` count them; `row_of_number` is the row of each anno_id.
-    """
+    # `masks` select these bytes, `lengths` count them; `row_of_number` is the row of each anno_id.
 
     words: Words
     masks: Words
@@ -126,7 +122,7 @@ class KeyWords(NamedTuple):
 
 @lru_cache(maxsize=4)
 def key_words(manifest: Manifest) -> KeyWords | None:
-    """The keys as words, made once for a manifest, or None when one has more than five digits."""
+    """Make the words of a manifest's keys; None if a key has more than five digits."""
     if int(manifest.anno_id.max()) >= 10**_MAX_DIGITS:
         return None
     texts = np.char.add(np.char.add(b'"', manifest.anno_id.astype(f"S{_MAX_DIGITS}")), b'":')
@@ -138,7 +134,6 @@ def key_words(manifest: Manifest) -> KeyWords | None:
 
 
 def _by_words(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
-    """Read keys of up to five digits as words; the module's docstring says why this is exact."""
     keys, n = key_words(manifest), manifest.n_sequences
     if keys is None or not _FIRST_DIGIT.match(text):
         return None
@@ -176,7 +171,6 @@ def _by_words(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
 
 
 def _are_separated(buffer: bytearray, octets: NDArray[np.uint8], opens: Rows, *, first_colon: int) -> bool:
-    """Whether the first key follows `{`, and each other one a comma and the same white space."""
     if buffer[_WORD_BYTES : opens[0]].strip(_WHITE_SPACE) != b"{":
         return False
     if len(opens) == 1:
@@ -189,7 +183,7 @@ def _are_separated(buffer: bytearray, octets: NDArray[np.uint8], opens: Rows, *,
 
 
 def _numbers_in(words: Words) -> Words:
-    """The decimal numbers before the last two bytes of words; words without a number give any number."""
+    # The digits before the last two bytes; words without digits give any number.
     other = (words ^ np.uint64(0x303030303030)) & np.uint64(0xF0F0F0F0F0F0)
     # The last byte that is no digit sets all bits before it.
     for n_bits in (1, 2, 4, 8, 16, 32):
@@ -203,7 +197,6 @@ def _numbers_in(words: Words) -> Words:
 
 
 def _by_object(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
-    """Read any keys through a dictionary."""
     n = manifest.n_sequences
     # Keys of the manifest hold no comma. So if every key is one of them, the commas count the members, and a
     # doubled key, of which the dictionary keeps the last, shows as one comma too many.

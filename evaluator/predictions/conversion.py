@@ -42,15 +42,12 @@ def convert(
     to_frame_gap: int | None = None,
     natural_keys: Mapping[str, str] | None = None,
 ) -> bytes:
-    """A prediction file with the same predictions in the unit `to`.
+    """Convert a prediction file to the unit `to`.
 
-    A file in the toolkit's flat form has times to contact, or scale ratios at the rate that `fps_hz` or
-    `frame_gap` says; an envelope says itself what it has. Scale ratios are written at `to_fps_hz` or
-    `to_frame_gap`, by themselves at 2 Hz (gap 5), the dataset's own. Keys stay as they are; whether they are
-    those of a split, `read_predictions` knows. With `natural_keys`, from anno_id to natural key, the file
-    must have exactly these anno_ids, and is written with the natural keys (see `numbering`).
-
-    Raises `Rejected` for what no prediction file may hold, `ValueError` for rates that do not fit together.
+    A flat file has seconds, or scale ratios at `fps_hz` or `frame_gap`; an envelope states its unit. Scale
+    ratios are written at `to_fps_hz` or `to_frame_gap`, by default 2 Hz (gap 5). Keys stay, unless
+    `natural_keys` maps exactly the file's anno_ids to natural keys. Raises `Rejected` for what no prediction
+    file may hold, `ValueError` for rates that do not fit together.
     """
     document = read_document(parse(json_of(as_sent(data_of(source)))))
     _require_one_rate(document, fps_hz, frame_gap)
@@ -87,11 +84,8 @@ def convert(
 def _require_ratios(
     ratios: Floats, ttc_s: Floats, document: Document, names: list[str], *, fps_hz: float
 ) -> None:
-    """Raise `Rejected` for times that no scale ratio at this rate can say, and name a gap at which one can.
-
-    An object that moves away and was at the observer's plane within the gap has no size in the reference
-    frame: α > 0 needs τ > 0, or τ < −1 / f.
-    """
+    """Raise `Rejected` for times without a scale ratio at this rate, with a gap that has one."""
+    # α > 0 needs τ > 0 or τ < −1 / f: otherwise the object was at the observer's plane within the gap.
     findings = Findings()
     limit_s = 1 / fps_hz
     for row in np.flatnonzero(~(ratios > 0)).tolist():
@@ -126,7 +120,6 @@ def _gap(frame_gap: int | None) -> int:
 def _require_anno_ids(
     names: list[str], natural_keys: Mapping[str, str], findings: Findings, pointer_of: PointerOf
 ) -> None:
-    """Note every way in which the keys of the file are not the anno_ids of the folder."""
     if names and set(natural_keys.values()).issuperset(names):
         message = (
             f"The {len(names):,} keys are natural keys already; expected anno_ids of the toolkit. "
@@ -153,8 +146,6 @@ def _require_anno_ids(
 
 
 def _rates(document: Document, names: list[str], findings: Findings) -> Floats:
-    """The pair rates in Hz, (n,) or (); faults are noted."""
-
     def by_key(members: Members, pointer_of: PointerOf, fault: Fault) -> Floats:
         given = dict(members)
         missing = [key for key in names if key not in given]

@@ -1,8 +1,4 @@
-"""The strict reading of a prediction file: every object as its list of members, every fault in words.
-
-This path decides what a file means. The columnar path (`evaluator.predictions.columns`) is only a faster way
-to the same result for files without surprises; it hands over whatever is unusual.
-"""
+"""Strict reading of a prediction file, which decides what a file means: every fault in words."""
 
 from __future__ import annotations
 
@@ -49,7 +45,7 @@ class Members(list[tuple[str, object]]):
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A parsed file: the predictions as they stand in it, and what the envelope says about them."""
+    """A parsed file: the predictions, and the envelope."""
 
     predictions: Members
     unit: Unit
@@ -59,16 +55,12 @@ class Document:
     enveloped: bool
 
     def pointer(self, key: str) -> str:
-        """The JSON pointer to the prediction of `key`."""
         return pointer("predictions", key) if self.enveloped else pointer(key)
 
 
 def parse(data: bytes, *, max_members: int | None = None) -> object:
-    """The JSON value in `data`, objects as `Members`; raises `Rejected` unless it is UTF-8, shallow and JSON.
-
-    Text with more than `max_members` members and items is refused before it takes memory. A byte order mark
-    and Python's `NaN`, `Infinity` and `-Infinity` are accepted; numbers beyond float64 are ±Infinity.
-    """
+    """Parse shallow UTF-8 JSON with objects as `Members`; raises `Rejected`, also for over `max_members`."""
+    # A byte order mark, `NaN` and ±`Infinity` are accepted; numbers beyond float64 become ±Infinity.
     body = data.removeprefix(BYTE_ORDER_MARK)
     try:
         text = body.decode("utf-8")
@@ -107,13 +99,12 @@ def parse(data: bytes, *, max_members: int | None = None) -> object:
 
 
 def _hint(data: bytes) -> str:
-    """A sentence on the kind of a file that begins with these bytes; empty if they are of no known kind."""
     kind = next((kind for start, kind in _LOOKS_LIKE.items() if data.startswith(start)), "")
     return f" The file looks like {kind}." if kind else ""
 
 
 def read_document(value: object) -> Document:
-    """The parts of a parsed file; raises `Rejected` for a wrong top level or a faulty envelope."""
+    """Split a parsed file; raises `Rejected` for a wrong top level or envelope."""
     if not isinstance(value, Members):
         message = (
             f"The outermost value is {kind_of(value)}; expected an object of predictions or an envelope."
@@ -151,7 +142,7 @@ def read_document(value: object) -> Document:
 
 
 def kind_of(value: object) -> str:
-    """The kind of a JSON value for messages, with the value if it is short.
+    """Name the kind of a JSON value, with the value if it is short.
 
     >>> kind_of("5.3"), kind_of(None), kind_of([1])
     ('the string "5.3"', 'null', 'a list')
@@ -253,12 +244,12 @@ def _text(text: str) -> str:
 
 
 def _integer(text: str) -> int | float:
-    """An integer literal; long ones become float64, since Python refuses to read very long ones."""
+    # Python refuses to read very long integers; they become float64.
     return int(text) if len(text) < 300 else float(text)
 
 
 def _depth(body: bytes) -> int:
-    """Depth of nesting, exact for every JSON prefix, so that the recursive parser cannot be driven deep."""
+    # Exact for every JSON prefix, so that no text drives the recursive parser deep.
     if body.count(b"{") + body.count(b"[") <= MAX_DEPTH:
         return 0
     brackets = _brackets(body)
@@ -272,7 +263,6 @@ def _depth(body: bytes) -> int:
 
 
 def _brackets(body: bytes) -> bytearray:
-    """The brackets of a text outside its strings."""
     # Match by match: to remove millions of strings at once would take eighty bytes for each piece left.
     brackets, end = bytearray(), 0
     for string in _STRING.finditer(body):

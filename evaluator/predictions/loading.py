@@ -1,8 +1,6 @@
-"""Prediction files: bytes in, values aligned with a manifest out, or a `Rejected` that says why.
+"""Prediction files: bytes to values aligned with a manifest (docs/file-format.md)."""
 
-docs/file-format.md describes the format. Nothing but `Rejected` leaves `read_sent`, whatever the bytes; every
-sequence of the manifest ends up with exactly one finite or infinite value that is neither 0 nor NaN.
-"""
+# For any bytes, `read_sent` either raises `Rejected` or gives every sequence one value, neither 0 nor NaN.
 
 from __future__ import annotations
 
@@ -35,9 +33,9 @@ from evaluator.truth.ground_truth import Manifest
 class Predictions:
     """One value per sequence of the manifest.
 
-    `ttc_s` is float64 (n,), read-only, in the manifest's order: seconds from the target frame, scale ratios
-    already converted, nothing truncated. `digest` is "sha256:" and the hex SHA-256 of the file's bytes.
-    `names` are the file's own keys by row, where it was written for another manifest than this one.
+    `ttc_s` is float64 (n,), read-only, in the manifest's order: seconds from the target frame, not truncated.
+    `digest` is "sha256:" and the hex SHA-256 of the file's bytes. `names` are the file's keys by row, if it
+    was written for another manifest.
     """
 
     manifest: Manifest
@@ -64,12 +62,12 @@ class Predictions:
         frame_gap: int | None = None,
         digest: str | None = None,
     ) -> Predictions:
-        """Predictions from values in the manifest's order, without a file.
+        """Make predictions from arrays (n,) in the manifest's order.
 
-        Give either `ttc_s` (seconds) or `scale_ratio` with `fps_hz` or `frame_gap`, (n,). Without a `digest`,
-        that of the seconds' little-endian float64 bytes is taken. Raises `ValueError` for another shape, a
-        Series in another order and arguments that do not fit together, `TypeError` for a dict, `Rejected`
-        for scale ratios that are not greater than 0; other forbidden values are found by `evaluate`.
+        Give `ttc_s` (seconds), or `scale_ratio` with `fps_hz` or `frame_gap`. The default `digest` is that of
+        the seconds as little-endian float64. Raises `ValueError` for a wrong shape, order or combination of
+        arguments, `TypeError` for a dict, `Rejected` for scale ratios that are not positive; `evaluate`
+        checks the values further.
         """
         require(manifest, Manifest, name="manifest")
         name, given = ("scale_ratio", scale_ratio) if ttc_s is None else ("ttc_s", ttc_s)
@@ -88,18 +86,18 @@ class Predictions:
         return cls(manifest=manifest, ttc_s=values, digest=content_digest, unit=unit)
 
     def where(self, row: int) -> str:
-        """The JSON pointer to the value of sequence `row`."""
+        """Return the JSON pointer to the value of sequence `row`."""
         ours = self.manifest.anno_id_keys if self.keys == "anno_id" else self.manifest.natural_keys
         names = ours if self.names is None else self.names
         return pointer("predictions", names[row]) if self.enveloped else pointer(names[row])
 
 
 def read_predictions(source: Source, *, manifest: Manifest, max_bytes: int | None = None) -> Predictions:
-    """Read a prediction file and align it with `manifest`; raises `Rejected` with every fault of the file.
+    """Read a prediction file and align it with `manifest`; raises `Rejected` with every fault.
 
-    `source` is a path, the bytes of the file or the file itself, open, in any form of docs/file-format.md;
-    larger than `max_bytes` it is not looked at. The digest is that of the bytes, of a Parquet table that of
-    the JSON that is sent in its place; such a table needs pyarrow (`ModuleNotFoundError` without).
+    `source` is a path, bytes or an open file of at most `max_bytes`, in any form of docs/file-format.md. The
+    digest is that of the bytes, for a Parquet table that of its JSON form. Parquet needs pyarrow
+    (`ModuleNotFoundError`).
     """
     require(manifest, Manifest, name="manifest")
     data = data_of(source)
@@ -109,7 +107,7 @@ def read_predictions(source: Source, *, manifest: Manifest, max_bytes: int | Non
 
 
 def read_sent(data: bytes, *, manifest: Manifest) -> Predictions:
-    """As `read_predictions`, in the forms that a leaderboard takes: bytes of strangers come here."""
+    """Read the forms that a leaderboard accepts, from untrusted bytes; else as `read_predictions`."""
     text = json_of(data, max_rows=2 * manifest.n_sequences + 100_000)
     column = read_column(text, manifest) or read_slowly(text, manifest)
     column.ttc_s.setflags(write=False)
@@ -125,7 +123,6 @@ def read_sent(data: bytes, *, manifest: Manifest) -> Predictions:
 
 
 def sha256_digest(data: bytes) -> str:
-    """`sha256:` and the hex digest of `data`."""
     return "sha256:" + hashlib.sha256(data).hexdigest()
 
 
@@ -160,18 +157,14 @@ _EXPECTED: Final = (
 
 
 def json_of(data: bytes, *, max_rows: int | None = None) -> bytes:
-    """The JSON text of a prediction file, which is most often the file itself.
-
-    Raises `Rejected` for an archive that is damaged or unpacks to too much, and for a table that cannot be
-    read or has more than `max_rows` rows.
-    """
+    """Return the JSON text of a prediction file; raises `Rejected` for a damaged or too large one."""
     if data.startswith(GZIP):
         data = _unpacked(data)
     return _of_table(data, max_rows=max_rows) if _is_table(data) else data
 
 
 def _unpacked(data: bytes) -> bytes:
-    """The content of a gzip archive, of all its members; nothing beyond the limits is ever unpacked."""
+    """Unpack all members of a gzip archive, never beyond the limits."""
     parts, start, n_members, n_left = list[bytes](), 0, 0, MAX_UNPACKED_BYTES
     while start < len(data):
         n_members += 1
@@ -190,7 +183,7 @@ def _unpacked(data: bytes) -> bytes:
 
 
 def _member(data: bytes, start: int, *, max_bytes: int) -> tuple[bytes, int]:
-    """The content of the member that begins at `start`, and where it ends; at most `max_bytes` of content."""
+    """Unpack the member at `start`, at most `max_bytes`; returns its content and end."""
     # A child that reads files may open nothing, and zlib opens nothing.
     reader, parts = zlib.decompressobj(wbits=31), list[bytes]()
     while not reader.eof:
@@ -211,7 +204,7 @@ def _member(data: bytes, start: int, *, max_bytes: int) -> tuple[bytes, int]:
 
 
 def _is_table(data: bytes) -> bool:
-    """Whether the first line names columns of a table; no JSON text begins so."""
+    # No JSON text begins with the columns of a table.
     match = _FIRST_LINE.match(data.removeprefix(b"\xef\xbb\xbf"))
     line = match[1] if match else b""
     fields = line.decode("utf-8", "replace").split(",")
@@ -238,7 +231,7 @@ def _of_table(data: bytes, *, max_rows: int | None) -> bytes:
 
 
 def _lines(text: str, *, max_rows: int | None) -> Iterator[str]:
-    """The lines of a table, its header first; refused before the fields of a line take memory."""
+    """Yield a table's lines, header first; a long line is refused before its fields take memory."""
     for number, line in enumerate(io.StringIO(text, newline="")):
         if max_rows is not None and number > max_rows:
             message = f"The table has more than {max_rows:,} rows; expected one for each sequence."
@@ -259,10 +252,7 @@ def _checked(rows: Iterator[list[str]], *, n_fields: int) -> Iterator[list[str]]
 
 
 def columns_of(header: Sequence[str]) -> tuple[Sequence[str], str, str | None]:
-    """The key columns, the value column and, for scale ratios, the rate column of a table.
-
-    Raises `Rejected` for a table without the columns that it needs.
-    """
+    """Return key columns, value column and rate column of a table; raises `Rejected` if one is missing."""
     keys = NATURAL_KEY if set(NATURAL_KEY) <= set(header) else ("anno_id",)
     values = [name for name in VALUES if name in header]
     rates = [name for name in RATES if name in header]
@@ -273,11 +263,8 @@ def columns_of(header: Sequence[str]) -> tuple[Sequence[str], str, str | None]:
 
 
 def document_of(header: Sequence[str], rows: Iterable[Sequence[str | None]]) -> bytes:
-    """The JSON text of a table: the flat form for seconds, an envelope for scale ratios.
-
-    Keys that appear twice stay there twice. A field of None has no value; those of keys have one. Raises
-    `Rejected` for a table without the columns that it needs.
-    """
+    """Write the JSON text of a table: flat for seconds, an envelope for scale ratios; raises `Rejected`."""
+    # Duplicate keys stay. A field of None has no value.
     keys, value, rate = columns_of(header)
     columns = {name: header.index(name) for name in (*keys, value, *([rate] if rate else []))}
     key_positions = [columns[name] for name in keys]
@@ -294,7 +281,7 @@ def document_of(header: Sequence[str], rows: Iterable[Sequence[str | None]]) -> 
 
 
 def _number(text: str | None) -> str:
-    """A field as JSON: the nearest float64 of a number, else the text, which the reader refuses.
+    """Write a field as JSON: the nearest float64, or the text for the reader to refuse.
 
     >>> _number(" 5.31"), _number("inf"), _number(""), _number(None)
     ('5.31', 'Infinity', '""', 'null')

@@ -1,7 +1,4 @@
-"""Predictions in a Parquet table, as the JSON that the leaderboard takes in its place.
-
-The leaderboard reads no Parquet (ADR 8). Needs pyarrow, `pip install '.[parquet]'`.
-"""
+"""Predictions in a Parquet table, converted to JSON on the participant's machine (ADR 8). Needs pyarrow."""
 
 from __future__ import annotations
 
@@ -16,10 +13,9 @@ _MAGIC: Final = b"PAR1"
 
 
 def as_sent(data: bytes) -> bytes:
-    """A prediction file as the leaderboard takes it: a Parquet table as JSON, any other file as it is.
+    """Convert a Parquet table to JSON, always the same bytes; other files stay.
 
-    The same table gives the same bytes. Raises `Rejected` for a table that is damaged or has other columns
-    than keys and numbers, `ModuleNotFoundError` where pyarrow is not installed.
+    Raises `Rejected` for a damaged table or other columns, `ModuleNotFoundError` without pyarrow.
     """
     if not data.startswith(_MAGIC):
         return data
@@ -42,7 +38,6 @@ def as_sent(data: bytes) -> bytes:
 
 
 def _columns(schema: Any) -> tuple[list[str], list[str]]:
-    """The columns of the key and those of the numbers, each of a type that can be what its name says."""
     from evaluator.predictions.loading import columns_of  # noqa: PLC0415 -- which asks this module
 
     keys, value, rate = columns_of(schema.names)
@@ -78,7 +73,6 @@ def _is_fitting(column_type: Any, *, is_key: bool) -> bool:
 
 
 def _rows(table: Any, keys: list[str], values: list[str]) -> Iterator[Sequence[str | None]]:
-    """The fields as text, of numbers the shortest that means the same; None where a value is missing."""
     number = 0
     for batch in table.iter_batches(columns=keys + values, use_threads=False):
         columns = [map(_text, batch.column(name).to_pylist()) for name in keys + values]

@@ -1,8 +1,6 @@
-"""Warnings about files that are well-formed and probably not meant: another unit, sign or order.
+"""Warnings about well-formed files that probably have another unit, sign or order."""
 
-A warning rejects nothing. Values are compared by the rank of -1/τ, which orders them by scale ratio, so that
-no outlier decides.
-"""
+# Values are compared by the rank of -1/τ, the order of scale ratios: outliers have no weight.
 
 from __future__ import annotations
 
@@ -44,13 +42,13 @@ Pairs = NDArray[np.intp]
 
 
 def warnings_of(predictions: Predictions) -> list[FileWarning]:
-    """Warnings from the file and its manifest, without any true value."""
+    """Warn of a file by its manifest, without true values."""
     manifest, ttc_s = predictions.manifest, predictions.ttc_s
     return [*unit_warnings(ttc_s), *_sign_warnings(manifest, ttc_s), *_order_warnings(manifest, ttc_s)]
 
 
 def unit_warnings(ttc_s: Floats) -> list[FileWarning]:
-    """Warnings from the values alone, (n,): whether they look like another unit than seconds."""
+    """Warn of values (n,) that look like another unit than seconds."""
     n = len(ttc_s)
     if n < MIN_VALUES:
         return []
@@ -99,7 +97,7 @@ def _order_warnings(manifest: Manifest, ttc_s: Floats) -> list[FileWarning]:
 
 
 def warnings_with_truth(predictions: Predictions, truth: GroundTruth) -> list[FileWarning]:
-    """What the values and the comparison with ground truth tell. Not for hidden ones: it tells about them."""
+    """Compare values with the ground truth. The warnings reveal it, so hidden truths must not be used."""
     return [*unit_warnings(predictions.ttc_s), *_truth_warnings(predictions, truth)]
 
 
@@ -131,12 +129,8 @@ _CAUSE: Final = (
 
 
 def roughness(manifest: Manifest, ttc_s: Floats) -> float | None:
-    """How far neighbouring windows of one object differ, over how far successive windows of two objects do.
-
-    Both are means of absolute differences of ranks: 1 where the values have nothing to do with their keys,
-    and well below where they are smooth in time. None where there are too few pairs, or the values do not
-    differ.
-    """
+    """Compare rank differences of neighbouring windows of one object with those of two objects."""
+    # 1 means that values are unrelated to their keys; smooth values give well below 1.
     same, other = _pairs(manifest)
     if min(len(same), len(other)) < MIN_PAIRS:
         return None
@@ -146,7 +140,7 @@ def roughness(manifest: Manifest, ttc_s: Floats) -> float | None:
 
 
 def order_of(ttc_s: Floats) -> Floats:
-    """The rank of each value by scale ratio, float64 (n,); equal values share the mean of theirs."""
+    """Rank values by scale ratio, float64 (n,), ties at their mean."""
     with np.errstate(divide="ignore", over="ignore"):
         _, index, counts = np.unique(-1 / ttc_s, return_inverse=True, return_counts=True)
     ends = np.cumsum(counts)
@@ -161,7 +155,6 @@ def _mean_difference(ranks: Floats, pairs: Pairs) -> float:
 
 @lru_cache(maxsize=4)  # by the manifest itself, which every file of a split shares
 def _pairs(manifest: Manifest) -> tuple[Pairs, Pairs]:
-    """Rows (n, 2) of neighbouring windows of one object, and of successive windows of two, per camera."""
     cameras = _numbered([f"{b}/{c}" for b, c in zip(manifest.bag_stamp, manifest.cam_id, strict=True)])
     tracks = _numbered(list(manifest.track_id))
     by_track = np.lexsort((manifest.ts_ns, tracks, cameras))

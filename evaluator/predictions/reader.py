@@ -1,8 +1,7 @@
-"""The child process in which untrusted bytes are parsed: `python -m evaluator.predictions.reader`.
+"""The child process that parses untrusted bytes: `python -m evaluator.predictions.reader`.
 
-It gives up its rights (`evaluator.limits`), writes `READY` to its standard output, reads a prediction file
-from its standard input, and writes one line of JSON, followed, if the file is good, by the aligned values in
-seconds as little-endian float64.
+It gives up its rights (`evaluator.limits`), writes `READY`, reads a prediction file from standard input, and
+writes a line of JSON and, for a good file, the aligned seconds as little-endian float64.
 """
 
 import json
@@ -19,7 +18,7 @@ from evaluator.truth.ground_truth import Manifest
 
 
 def warm_up(manifest: Manifest) -> None:
-    """Run every branch that imports late, and make the manifest's keys: nothing can be opened afterwards."""
+    # Late imports and the manifest's keys: nothing can be opened afterwards.
     _ = key_words(manifest), manifest.row_of_natural_key
     for sample in (
         b"{",
@@ -41,7 +40,6 @@ def warm_up(manifest: Manifest) -> None:
 
 
 def answer(data: bytes, *, manifest: Manifest) -> bytes:
-    """The header line for these bytes, and the values behind it if they are good."""
     try:
         predictions = read_sent(data, manifest=manifest)
     except Rejected as rejected:
@@ -58,7 +56,7 @@ def answer(data: bytes, *, manifest: Manifest) -> bytes:
 
 
 def main() -> None:
-    """Arguments: manifest file, memory limit in bytes, processor time in seconds."""
+    """Run with the arguments: manifest file, memory limit in bytes, processor time in seconds."""
     obey_the_parent_alone()
     manifest = Manifest.load(Path(sys.argv[1]))
     warm_up(manifest)

@@ -1,15 +1,12 @@
-"""The process that forks a child for each prediction file: `python -m evaluator.predictions.reader_server`.
-
-A file of 28,600 sequences takes 0.44 s in a new Python, which loads numpy first, and 0.02 s in a forked one.
-The server has no credentials and reads no untrusted byte itself: it forks a child for each file, which gives
-up its rights, reads, answers and ends, as `evaluator.predictions.reader` does.
+"""The process that forks a reader for each prediction file: `python -m evaluator.predictions.reader_server`.
 
 Standard input is a socket of packets. A request is JSON (`manifest`, `memory_bytes`, `cpu_s`) with three
-descriptors: the file, and the pipes for the child's output and errors. The first reply is
-`{"started": pid}` with a descriptor of the process, or `{"failed": reason}` if there is no child; the second
-is `{"returncode": n}`, negative for a signal. One file at a time. The server ends with the process that has
-the other end of the socket.
+descriptors: the file, and the pipes for output and errors. The replies are `{"started": pid}` with a
+descriptor of the child, or `{"failed": reason}`; then `{"returncode": n}`, negative for a signal.
 """
+
+# A fork reads 28,600 sequences in 0.02 s, a new Python, which loads numpy, in 0.44 s. The server itself has
+# no credentials and reads no untrusted byte; it handles one file at a time.
 
 import gc
 import json
@@ -39,7 +36,6 @@ N_DESCRIPTORS: Final = 3
 
 
 def _manifest(path: str) -> Manifest:
-    """The manifest in a file as it is now; raises `OSError` or `Rejected` where there is none."""
     status = Path(path).stat()
     return _loaded(path, status.st_ino, status.st_mtime_ns)
 
@@ -54,7 +50,6 @@ def _loaded(path: str, _inode: int, _mtime_ns: int) -> Manifest:
 
 
 def serve(connection: socket.socket) -> None:
-    """Answer requests until the other end is closed."""
     while True:
         packet, descriptors, _, _ = socket.recv_fds(connection, MAX_PACKET_BYTES, N_DESCRIPTORS)
         if not packet:
@@ -101,7 +96,6 @@ def _send(connection: socket.socket, reply: dict[str, object]) -> None:
 def _read(
     descriptors: list[int], *, manifest: Manifest, server: int, memory_bytes: int, cpu_s: int
 ) -> NoReturn:
-    """The child: give up all rights, read the file, answer, end."""
     code = 1
     try:
         for number, descriptor in enumerate(descriptors):
@@ -130,7 +124,6 @@ def _answer(manifest: Manifest, *, memory_bytes: int, cpu_s: int) -> int:
 
 
 def main() -> None:
-    """Serve on the socket that is standard input."""
     obey_the_parent_alone()
     keep_memory_private()
     # What a library of the worker has opened without care is none of a reader's business.

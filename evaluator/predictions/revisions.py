@@ -1,8 +1,4 @@
-"""Revisions of a ground truth: the changes between two, and reading a file for one with the other.
-
-Sequences are told apart by their natural keys; an anno_id is a number of one manifest and means nothing in
-another.
-"""
+"""Revisions of a ground truth: their differences by natural key, and a file for one read with another."""
 
 from __future__ import annotations
 
@@ -21,8 +17,7 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Counts of sequences: only in the new one, only in the old one, in both with another time to contact,
-    in both with another anno_id."""
+    """Counts of sequences: added, removed, with another time to contact, with another anno_id."""
 
     n_added: int
     n_removed: int
@@ -31,7 +26,6 @@ class Comparison:
 
 
 def compare(old: GroundTruth, new: GroundTruth) -> Comparison:
-    """Count the sequences that `new` adds, removes, changes and renumbers."""
     rows = rows_in(old.manifest, new.manifest)
     common = rows >= 0
     n_common = int(np.count_nonzero(common))
@@ -45,7 +39,7 @@ def compare(old: GroundTruth, new: GroundTruth) -> Comparison:
 
 
 def rows_in(old: Manifest, new: Manifest) -> Rows:
-    """For every sequence of `new` its row in `old`, (n,); -1 where `old` does not have it."""
+    """Find the row in `old` of every sequence of `new`, (n,); -1 if absent."""
     if old.digest == new.digest:
         # The same sequences under the same numbers, whose rows may stand in another order.
         rows = np.empty(new.n_sequences, dtype=np.intp)
@@ -56,11 +50,7 @@ def rows_in(old: Manifest, new: Manifest) -> Rows:
 
 
 def realigned(predictions: Predictions, *, manifest: Manifest) -> Predictions:
-    """The predictions in the order of another manifest, sequence by sequence.
-
-    Values for sequences that `manifest` does not have are left aside. Raises `Rejected` with `missing-keys`
-    where it has sequences that the file's own manifest did not have.
-    """
+    """Reorder predictions for another manifest; raises `Rejected` (`missing-keys`) for new sequences."""
     own = predictions.manifest
     rows = rows_in(own, manifest)
     if len(missing := np.flatnonzero(rows < 0)):
@@ -73,7 +63,7 @@ def realigned(predictions: Predictions, *, manifest: Manifest) -> Predictions:
 
 
 def absent(rows: Rows, *, manifest: Manifest) -> Rejected:
-    """The rejection of a file whose own manifest did not have these rows of `manifest`, to be raised."""
+    """Make the rejection for these rows of `manifest`, which the file's own manifest lacks."""
     names = [manifest.natural_keys[row] for row in rows.tolist()]
     n = len(names)
     what = counted(n, "sequence has", "sequences have")

@@ -1,7 +1,6 @@
-"""What a value of a prediction file must be: the one list of rules.
+"""The rules for a value of a prediction file, one list for reading, writing, conversion and scoring.
 
-To add a rule, add it to `RULES` and its code to `PROBLEM_CODES`. Both ways of reading, writing, conversion,
-scoring and the leaderboard's check of what a reader says all ask here.
+To add a rule, add it to `RULES` and its code to `PROBLEM_CODES`.
 """
 
 from __future__ import annotations
@@ -19,10 +18,7 @@ from evaluator.predictions.documents import Unit, kind_of
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A rule of values: `holds` is asked for one number and elementwise for an array, NaN included.
-
-    `shown` and `expected` are the words of its problem; {} stands for the value.
-    """
+    """A rule: `holds` for a number or elementwise for an array; {} in its texts is the value."""
 
     code: str
     holds: Callable[[Any], Any]
@@ -30,7 +26,6 @@ class Rule:
     shown: str = "{}"
 
     def message(self, value: float) -> str:
-        """The problem of this value in a sentence."""
         return f"The value is {self.shown.format(kind_of(value))}; expected {self.expected}."
 
 
@@ -53,12 +48,10 @@ RULES: Final[dict[Unit, tuple[Rule, ...]]] = {
 
 
 def broken_rule(value: float, *, unit: Unit) -> Rule | None:
-    """The first rule that a value breaks; None where a file may hold it."""
     return next((rule for rule in RULES[unit] if not rule.holds(value)), None)
 
 
 def allowed(values: Floats, *, unit: Unit) -> NDArray[np.bool_]:
-    """Whether a file may hold each of these values, of their shape."""
     is_allowed = np.ones(values.shape, dtype=np.bool_)
     for rule in RULES[unit]:
         is_allowed &= rule.holds(values)

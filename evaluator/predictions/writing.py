@@ -32,13 +32,12 @@ def write_predictions(
     frame_gap: int | None = None,
     meta: Mapping[str, object] | None = None,
 ) -> bytes:
-    """The bytes of a valid prediction file, also written to `path`, or to an open file, if one is given.
+    """Write a valid prediction file; returns its bytes, and writes them to `path` or an open file if given.
 
-    Give either `ttc_s` (seconds) or `scale_ratio` with `fps_hz` or `frame_gap`, shape (n,); and either
-    `manifest`, whose order the values have, or their `keys`. Every float64 reads back exactly. Seconds
-    without `meta` are written in the toolkit's flat form, anything else in the envelope.
-
-    Raises `ValueError` for arguments that do not fit together, `Rejected` for values that no file may hold.
+    Give `ttc_s` (seconds), or `scale_ratio` with `fps_hz` or `frame_gap`, (n,); and `manifest`, whose order
+    the values have, or their `keys`. Every float64 reads back exactly. Seconds without `meta` use the flat
+    form, others the envelope. Raises `ValueError` for a wrong combination of arguments, `Rejected` for values
+    that no file may hold.
     """
     values = _values(ttc_s, scale_ratio, manifest)
     names = _names(manifest, keys, n_values=len(values))
@@ -60,7 +59,7 @@ def write_predictions(
 
 
 def template(manifest: Manifest) -> bytes:
-    """A prediction file to be filled in: `null`, which is refused, for every anno_id of the manifest."""
+    """Write a file to fill in: `null`, which is refused, for every anno_id of the manifest."""
     members = ",\n".join(f'"{name}": null' for name in manifest.anno_id_keys)
     return f"{{\n{members}\n}}\n".encode()
 
@@ -89,7 +88,7 @@ def _names(manifest: Manifest | None, keys: Sequence[str | int] | None, *, n_val
 
 
 def require_values(values: Floats, names: Sequence[str], *, is_ratio: bool) -> None:
-    """Raise `Rejected` for values that no file may hold, by the names of their sequences."""
+    """Raise `Rejected`, by the names of sequences, for values that no file may hold."""
     findings = Findings()
     unit: Unit = "scale_ratio" if is_ratio else "ttc"
     for row in np.flatnonzero(~allowed(values, unit=unit)).tolist():
@@ -100,7 +99,7 @@ def require_values(values: Floats, names: Sequence[str], *, is_ratio: bool) -> N
 
 
 def rate_of(*, is_ratio: bool, fps_hz: float | None, frame_gap: int | None) -> float | None:
-    """The rate of scale ratios in Hz, None for seconds; raises `ValueError` as `write_predictions` does."""
+    """Return the rate in Hz, None for seconds; raises `ValueError` as `write_predictions` does."""
     header = _header(is_ratio, fps_hz, frame_gap)
     if not is_ratio:
         return None

@@ -57,7 +57,6 @@ def scores_of(
     with_intervals: bool = False,
     unit: str | None = None,
 ) -> list[GroupScores]:
-    """The scores of groups of sequences, given as the rows of each by its name."""
     manifest, ttc_s, errors = details.truth.manifest, details.truth.ttc_s, details.errors
     masks = {OVERALL: np.ones(len(ttc_s), dtype=bool)}
     for ttc_range in details.protocol.ranges if has_ranges else ():
@@ -95,7 +94,6 @@ def scores_of(
 def _intervals(
     truth: GroundTruth, sums: Sequence[Floats], counts: Sequence[Floats], *, unit: str | None
 ) -> list[Ends | None]:
-    """The interval of each column, all by the same weights."""
     if not sums:
         return []
     units = truth.manifest.units_by(unit)
@@ -111,14 +109,14 @@ def _intervals(
 
 
 def groups_of(details: Details, *, by: str) -> dict[str, Rows]:
-    """The rows of every group that has some, by its name. Raises `ValueError` as `Report.breakdown` does."""
+    """Return the rows of every non-empty group. Raises `ValueError` as `Report.breakdown` does."""
     if by not in GROUPS:
         raise ValueError(f"Unknown group {by!r}; expected one of {', '.join(GROUPS)}.")
     return {name: rows for name, rows in GROUPS[by](details).items() if len(rows)}
 
 
 def curve_of(details: Details) -> dict[Ends, Rows]:
-    """The rows of every bin [low, high) of true times that has some, by its ends in seconds."""
+    """Return the rows of every non-empty bin [low, high) of true times, by its ends in seconds."""
     bins = np.digitize(details.truth.ttc_s, CURVE_EDGES_S)
     ends = itertools.pairwise(CURVE_EDGES_S)
     rows_of_bin = {pair: np.flatnonzero(bins == number) for number, pair in enumerate(ends, 1)}

@@ -1,12 +1,11 @@
-"""Whether recordings of one unit, such as a day, are alike, and by how much that widens a standard error.
+"""The likeness of recordings of one unit, such as a day, and how much it widens a standard error.
 
-With u_g = S_g − θ n_g, what recording g adds to the error of the mean θ of N sequences,
+With u_g = S_g − θ n_g, the part of recording g in the error of the mean θ of N sequences,
 
     SE²_recording = Σ u_g² / N²        SE²_unit = Σ_d (Σ_{g in d} u_g)² / N²        (Liang and Zeger 1986)
 
-The correlation within a unit is the mean product of two different recordings of one unit over the mean square
-of one, each by its sequences: Σ_{g ≠ h, same unit} u_g u_h / Σ n_g n_h ÷ (Σ u_g² / Σ n_g²). Units are
-permuted over the recordings for its p: how often chance alone correlates them as much.
+The correlation within a unit is Σ_{g ≠ h, same unit} u_g u_h / Σ n_g n_h ÷ (Σ u_g² / Σ n_g²); its p comes
+from permuting units over recordings.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ N_PERMUTATIONS: Final = 1_999
 
 @dataclass(frozen=True, slots=True)
 class Dependence:
-    """Standard error by units over that by recordings, correlation within a unit, and its one-sided p."""
+    """Standard error by units over that by recordings, correlation within a unit, one-sided p."""
 
     se_factor: float
     correlation: float
@@ -35,10 +34,7 @@ class Dependence:
 def dependence(
     sums: Floats, counts: Floats, units: Units, *, rng: np.random.Generator, n: int = N_PERMUTATIONS
 ) -> Dependence | None:
-    """Of one column: `sums` and `counts` of recordings, (G,) each. `n` permutations are drawn.
-
-    None where no unit has two recordings with sequences, and where nothing differs between recordings.
-    """
+    """Measure one column by `sums` and `counts` (G,) of recordings; None without units of two."""
     rests = sums - sums.sum() / counts.sum() * counts if counts.sum() else np.zeros_like(sums)
     square = float((rests**2).sum())
     orders = np.stack([np.arange(len(sums)), *(rng.permutation(len(sums)) for _ in range(n))], axis=1)

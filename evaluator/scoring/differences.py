@@ -1,8 +1,7 @@
-"""The difference of two entries: a sign-flip test, and the confidence interval that belongs to it.
+"""The difference of two entries: a sign-flip test, and its confidence interval by test inversion.
 
-Both come from the same random signs. D_g is the sum of errors of unit g (a day or a recording) of the first
-entry less that of the second, n_g the number of its sequences. Signs split the units into two halves, + and
-−; were neither entry better, whatever stands in one half could as well stand in the other.
+D_g is the sum of errors of unit g (a day or a recording) of the first entry minus that of the second, n_g its
+number of sequences. Test and interval use the same random signs.
 """
 
 from __future__ import annotations
@@ -36,10 +35,7 @@ _SEEDS: Final = 2**63 - 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SignFlips:
-    """What turning signs says of every column: float64 (columns,) each.
-
-    0 lies outside the interval from `low` to `high` exactly where `p` is below 0.05.
-    """
+    """Results by column, float64 (columns,): `p` is below 0.05 exactly where 0 is outside `low` … `high`."""
 
     p: Floats
     low: Floats
@@ -49,25 +45,18 @@ class SignFlips:
 def sign_flips(
     differences: Floats, counts: Floats, *, rng: np.random.Generator, n_flips: int = N_SIGN_FLIPS
 ) -> SignFlips:
-    """Test and interval of every column of `differences` by their `counts`, (G, columns) both.
+    """Test each column of `differences` by its `counts`, (G, columns) both, and invert the test.
 
         p = (1 + #{|Σ ±D_g| ≥ |Σ D_g|}) / (R + 1)
 
-    Since both entries have the same sequences, ΣD_g / n is the difference of their means, and no ratio has to
-    be linearised. The test assumes that D_g is symmetric where neither is better, as likely to be −D_g. A
-    unit is turned as a whole, since its sequences are not independent. Without any difference p is 1.
+    The test assumes that D_g is symmetric under the null hypothesis. The p of a difference δ is that of D_g −
+    δ n_g; the interval is every δ with p ≥ 0.05 (Hartigan, JASA 64, 1969). Signs with the sum S₊ over n₊
+    sequences in one half, S₋ over n₋ in the other, count against δ as
 
-    The p of a difference δ is that of the test of D_g − δ n_g. With a sum of S₊ over n₊ sequences in the one
-    half, S₋ over n₋ in the other, a vector of signs counts against δ if its two halves disagree about it,
+        |Σ ±(D_g − δ n_g)| ≥ |Σ (D_g − δ n_g)|   ⇔   δ is between S₊ / n₊ and S₋ / n₋.
 
-        |Σ ±(D_g − δ n_g)| ≥ |Σ (D_g − δ n_g)|   ⇔   δ lies between S₊ / n₊ and S₋ / n₋,
-
-    and every δ whose p is at least 0.05 belongs to the interval (Hartigan, JASA 64, 1969). All these
-    stretches hold the observed difference, so the interval begins at the k-th smallest of the lower ends and
-    ends at the k-th largest of the upper ones, with k the smallest number for which (1 + k) / (R + 1) ≥ 0.05.
-    A half without any sequence says nothing: its vector of signs counts against every δ.
-
-    Where no δ is excluded, as with very few units, the ends are −∞ and ∞.
+    The interval runs from the k-th smallest lower end to the k-th largest upper one, k the smallest number
+    with (1 + k) / (R + 1) ≥ 0.05. An empty half counts against every δ. Very few units give −∞ … ∞.
     """
     n_columns = differences.shape[1]
     both = np.concatenate([differences, counts], axis=1)
@@ -90,13 +79,13 @@ def sign_flips(
 
 
 def _nothing_left(twice: Floats, nothing: Floats) -> Floats:
-    """Sums of the same numbers in another order differ by rounding: what is left of nothing is 0."""
+    # Sums of the same numbers in another order differ by rounding: the rest of nothing is 0.
     twice[np.abs(twice) <= nothing] = 0.0
     return twice
 
 
 def _stretches(plus: Floats, minus: Floats) -> tuple[Floats, Floats]:
-    """Between which differences two halves disagree, from sums over numbers, (2 columns, n) each."""
+    """Compute the differences about which two halves disagree, from sums and numbers, (2 columns, n)."""
     n_columns = len(plus) // 2
     is_empty = (plus[n_columns:] == 0) | (minus[n_columns:] == 0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -106,7 +95,7 @@ def _stretches(plus: Floats, minus: Floats) -> tuple[Floats, Floats]:
 
 
 def _ends(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
-    """Where the interval of every column begins and ends, (columns,) each, by its stretches (columns, R)."""
+    """Compute each column's interval, (columns,) low and high, from stretches (columns, R)."""
     n_flips = lower.shape[1]
     k = next(k for k in range(n_flips + 1) if (1 + k) / (n_flips + 1) >= SIGNIFICANT)
     if k == 0:
@@ -125,11 +114,7 @@ def difference(
     n_flips: int = N_SIGN_FLIPS,
     unit: str = RECORDING,
 ) -> dict[str, Difference]:
-    """Compare the sums of two entries over the same sequences, (G, columns) each; nothing is rounded.
-
-    `names` are those of the columns, a protocol's `score_names`; `unit` is the kind of the units whose sums
-    they are. A column without sequences is absent.
-    """
+    """Compare sums (G, columns) of two entries over the same sequences; empty columns are absent."""
     gaps, n, degrees = first - second, counts.sum(axis=0), degrees_of(counts)
     flips = sign_flips(gaps, counts, rng=signs, n_flips=n_flips)
     # With 8 degrees of freedom there are 8 units, and an end is missing after a few dozen flips alone.
@@ -151,11 +136,11 @@ def difference(
 def influence(
     differences: Floats, counts: Floats, *, rng: np.random.Generator, n_flips: int = N_SIGN_FLIPS
 ) -> Influence:
-    """Leave units out until a difference is not significant, and until it has the other sign.
+    """Count the units to leave out until a difference is insignificant, and until its sign changes.
 
-    `differences` and `counts` are those of one column, (units,) each. First left out are the units that
-    favour the better entry most. For the sign no other choice needs fewer; for the p of the rest another
-    one might (Broderick, Giordano and Meager, arXiv 2011.14999), so that number is an upper bound.
+    `differences` and `counts` are those of one column, (units,). Units that favour the better entry most are
+    left out first. The first number is an upper bound (Broderick, Giordano and Meager, arXiv 2011.14999), the
+    second is exact.
     """
     total = float(differences.sum())
     favours = differences * np.sign(total)
@@ -189,10 +174,7 @@ def with_influence(
     names: Sequence[str],
     rng: np.random.Generator,
 ) -> dict[str, Difference]:
-    """Add to `compared` on how few units the difference in overall MiD rests, where there are enough for a p.
-
-    `differences` and `counts` are (units, columns), `names` those of the columns.
-    """
+    """Add to `compared` the influence on overall MiD, if it has a p; sums and counts are (units, columns)."""
     overall = compared.get(PRIMARY)
     if overall is None or overall.p_below is None:
         return dict(compared)
@@ -202,11 +184,7 @@ def with_influence(
 
 
 def _first_false(holds: Callable[[int], bool], last: int) -> int:
-    """The first number up to `last` for which it does not hold, if it holds for all before and none after.
-
-    >>> _first_false(lambda n: n < 5, 9)
-    5
-    """
+    """Find the first number up to `last` where `holds` turns false."""
     holding, failing = 0, last
     while failing - holding > 1:
         middle = (holding + failing) // 2
@@ -217,16 +195,12 @@ def _first_false(holds: Callable[[int], bool], last: int) -> int:
 def rounded_difference(
     exact: Difference, *, first: float | None, second: float | None, decimals: int
 ) -> Difference:
-    """A difference as it is published, by the two values that it is between; these may be rounded already.
+    """Round a difference for publication, between two published values.
 
-    - It is the difference of the two published values, whatever lies behind their last digits.
-    - Values that are published alike are not told apart: p is 1, and the interval holds 0.
-    - Else 0 is outside the published interval exactly where p is below 0.05: an end that would round to 0
-      is published as one unit of the last digit on its own side.
-    - The interval holds the published difference.
-    - p keeps the four decimals that it has, and is judged as it was computed.
-
-    Without one of the values the difference itself is rounded.
+    It equals the difference of the published values, and its interval holds it. Equal values get p = 1 and an
+    interval around 0. Otherwise 0 is outside the interval exactly where the unrounded p is below 0.05: an end
+    that would round to 0 becomes one unit of the last digit. Without one of the values, the difference itself
+    is rounded.
 
     >>> rounded_difference(Difference(0.41, 0.003, 0.82, 0.0496), first=1.41, second=1.0, decimals=2)
     Difference(difference=0.41, low=0.01, high=0.82, p=0.0496, p_below=0.05, n_effective=None)
@@ -269,11 +243,11 @@ def compare_predictions(
     decimals: int | None = PUBLISHED_DECIMALS,
     unit: str | None = None,
 ) -> dict[str, Difference]:
-    """Compare two sets of predictions of the same sequences: first minus second under each score name.
+    """Compare two predictions of the same sequences: first minus second, by score name.
 
-    The random numbers belong to the ground truth's revision, so these are the numbers of an open board's own
-    comparison, rounded as there to `decimals` (None: not at all). `unit` is as in
-    `confidence_intervals`. A column without sequences is absent. Raises as `evaluator.evaluate` does.
+    The result equals an open board's comparison, with random numbers of the truth's revision, rounded to
+    `decimals` (None: unrounded). `unit` is as in `confidence_intervals`. A column without sequences is
+    absent. Raises as `evaluate` does.
     """
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
     one, other = (Scorer(truth, rules).report(each, keep_bags=True) for each in (first, second))

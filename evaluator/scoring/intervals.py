@@ -15,7 +15,7 @@ from evaluator.truth.ground_truth import GroundTruth
 def recording_sums(
     predictions: Predictions, truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL
 ) -> RecordingSums:
-    """Sums per recording of one set of predictions; raises as `evaluator.evaluate` does."""
+    """Sum errors per recording; raises as `evaluate` does."""
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
     bags = Scorer(truth, rules).report(predictions, keep_bags=True).bags
     assert bags is not None  # noqa: S101 - they were asked for
@@ -29,10 +29,10 @@ def confidence_intervals(
     protocol: str | Protocol = DEFAULT_PROTOCOL,
     unit: str | None = None,
 ) -> dict[str, tuple[float, float] | None]:
-    """The 95 % interval of each number, as the board shows it; None where there is none.
+    """Compute the 95 % interval of each score as the board shows it; None where there is none.
 
-    `unit` is recording, day or given; None: by the rule, `truth.manifest.units`. Raises `ValueError` for a
-    unit that the recordings do not have.
+    `unit` is recording, day or given; None takes `truth.manifest.units`. Raises `ValueError` for a unit that
+    the recordings lack.
     """
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
     units = truth.manifest.units_by(unit)

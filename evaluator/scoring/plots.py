@@ -1,7 +1,6 @@
-"""Figures for a paper: error by true time to contact, predicted against true, distribution. Needs `[plots]`.
+"""Figures for a paper: error by true time, predicted against true, distribution. Needs `[plots]`."""
 
-Matplotlib draws on a canvas of its own: no window opens, and no other figure of the program is touched.
-"""
+# Matplotlib draws on a canvas of its own: no window opens, and other figures of the program stay.
 
 from __future__ import annotations
 
@@ -37,10 +36,7 @@ SETTINGS: Final[dict[str, Any]] = {
 
 
 def draw(kind: str, scored: Mapping[str, Details], *, path: str | Path | None = None) -> Figure:
-    """Draw `kind`, one of `KINDS`, of what was scored, by the names that the legend shows.
-
-    Raises `ValueError` for another kind and another ending of `path`.
-    """
+    """Draw `kind`, one of `KINDS`, of details by legend name; raises `ValueError` for others."""
     if kind not in KINDS:
         raise ValueError(f"Unknown kind {kind!r}; expected one of {', '.join(KINDS)}.")
     if path is not None and Path(path).suffix.lower() not in SUFFIXES:
@@ -58,7 +54,6 @@ def draw(kind: str, scored: Mapping[str, Details], *, path: str | Path | None = 
 
 
 def _error(figure: Figure, scored: Mapping[str, Details]) -> None:
-    """Mean errors over bins of the true time, each with its 95 % confidence interval where there is one."""
     metrics = [metric_of(name) for name in next(iter(scored.values())).errors]
     axes = figure.subplots(1, len(metrics), squeeze=False)[0]
     for number, (name, details) in enumerate(scored.items()):
@@ -81,7 +76,6 @@ def _error(figure: Figure, scored: Mapping[str, Details]) -> None:
 
 
 def _scatter(figure: Figure, scored: Mapping[str, Details]) -> None:
-    """Predicted against true seconds, a panel for each report; at most 5,000 points, drawn at random."""
     panels = figure.subplots(1, len(scored), squeeze=False, sharex=True, sharey=True)[0]
     for number, (axis, (name, details)) in enumerate(zip(panels, scored.items(), strict=True)):
         drawn = np.random.default_rng(0).permutation(details.truth.n_sequences)[:MAX_POINTS]
@@ -103,7 +97,6 @@ def _scatter(figure: Figure, scored: Mapping[str, Details]) -> None:
 
 
 def _distribution(figure: Figure, scored: Mapping[str, Details]) -> None:
-    """The share of sequences whose error is at most so large."""
     metrics = [metric_of(name) for name in next(iter(scored.values())).errors]
     axes = figure.subplots(1, len(metrics), squeeze=False, sharey=True)[0]
     for number, (name, details) in enumerate(scored.items()):
@@ -125,7 +118,6 @@ def _heading(metric: Metric) -> str:
 
 
 def _legend(figure: Figure, axis: Any, scored: Mapping[str, Details]) -> None:
-    """Above the panels, where it covers no curve."""
     if len(scored) > 1:
         handles, names = axis.get_legend_handles_labels()
         figure.legend(handles, names, loc="outside upper center", ncols=len(names), frameon=False)

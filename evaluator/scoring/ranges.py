@@ -1,10 +1,9 @@
-"""Rank ranges: all pairs of a column compared at once, published results among them.
+"""Rank ranges: all pairs of a column compared at once, with quoted rows.
 
-A quoted row was printed in a paper and has no recordings. Its value v is known as exactly as it was printed:
-14.8 may have been anything from 14.75 to 14.85. In recording g an entry of exactly that value would have the
-sum v n_g, so a quoted row takes part as such an entry: as one of its upper end where an entry is asked to be
-worse than it, of its lower end where one is asked to be better. What is found then holds whatever the value
-was before it was rounded. Two quoted rows are never compared.
+A quoted row comes from a paper, without recordings: its printed 14.8 may be anything from 14.75 to 14.85. It
+takes part as an entry with the sum v n_g in recording g, v being the upper end when an entry is tested as
+worse and the lower end when tested as better, so a finding holds for every value in between. Two quoted rows
+are never compared.
 """
 
 from __future__ import annotations
@@ -44,11 +43,9 @@ _LOWER_END: Final = -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quoted:
-    """Rows printed in papers: `values` as printed and their `half_widths`, (rows, columns), NaN where absent.
+    """Rows of papers: `values` ± `half_widths` (rows, columns), NaN if absent; `counts` (G, columns)."""
 
-    A value v with half width h may have been anything from v − h to v + h before it was rounded: h is 0.05
-    for one decimal. `counts` (G, columns) are the sequences of each recording.
-    """
+    # The half width of a value with one decimal is 0.05.
 
     values: Floats
     half_widths: Floats
@@ -57,14 +54,14 @@ class Quoted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RankRanges:
-    """Where each of N entries may stand in each of the columns, int64 (N, columns); 0 where there is none."""
+    """Lowest and highest rank of N entries in each column, int64 (N, columns); 0 if absent."""
 
     low: Integers
     high: Integers
 
     @property
     def is_with_best(self) -> Booleans:
-        """Which may be the best of their column, at 95 %: those whose range begins at 1."""
+        """Whether the range begins at 1."""
         return np.asarray(self.low == 1)
 
 
@@ -77,18 +74,14 @@ def rank_ranges(
     quoted: Quoted | None = None,
     between: Callable[[], None] = lambda: None,
 ) -> RankRanges:
-    """Rank ranges at 95 % of N entries by their `sums` (N, G, columns), of the columns that are `usable`.
+    """Compute 95 % rank ranges of N entries by `sums` (N, G, columns), in the `usable` columns.
 
-    `published` (N, columns) are their values as they are ranked, NaN where an entry has none. In each column
-    all pairs are compared at once: step-down max-t over the paired differences, from 1 + (how many rows are
-    significantly better) to the number of rows − (how many are significantly worse), after Mogstad, Romano,
-    Shaikh and Wilhelm (Review of Economic Studies 91, 2024). With 95 % probability every range of a column
-    holds its entry's true rank. A difference is studentised by its own recordings, t = ΣD_g / √ΣD_g², and
-    what chance makes of the largest t is read from turning the recordings' signs, as `differences.sign_flips`
-    does for one pair.
-
-    Values that are published alike are never told apart, so a range holds the published rank as well.
-    `between` is called every fraction of a second.
+    `published` (N, columns) are the ranked values, NaN where absent; `between` is called every fraction of a
+    second. In each column, step-down max-t over all paired differences (Mogstad, Romano, Shaikh and Wilhelm,
+    Review of Economic Studies 91, 2024) gives the range from 1 + (rows significantly better) to rows − (rows
+    significantly worse); all ranges hold the true ranks with 95 % probability. t = ΣD_g / √ΣD_g², its null
+    distribution comes from sign flips. Equal published values never differ significantly, so a range holds
+    the published rank.
     """
     low, high = np.zeros((2, *published.shape), dtype=np.int64)
     drawn = rng.integers(0, 2, size=(N_RANK_FLIPS, sums.shape[1]), dtype=np.int8)
@@ -106,7 +99,7 @@ def rank_ranges(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rows:
-    """What takes part in a column: its entries, then both ends of its quoted rows. `sums` are (n, G)."""
+    """The rows of a column: entries, then both ends of quoted rows. `sums` are (n, G)."""
 
     sums: Floats
     values: Floats
@@ -115,11 +108,9 @@ class _Rows:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pairs:
-    """Pairs of rows: which is worse if any is, how much in standard errors, and 1 / √ΣD²; all (n,).
+    """Pairs of rows: the worse one, by how many standard errors t, and 1 / √ΣD²; all (n,)."""
 
-    t is 0 where neither can be called worse. Of a two-sided pair the opposite, that the better one is worse,
-    can never be found and takes part as well.
-    """
+    # t is 0 where neither can be worse. The opposite of a two-sided pair takes part in the maximum as well.
 
     worse: NDArray[np.int32]
     better: NDArray[np.int32]
@@ -128,7 +119,6 @@ class _Pairs:
     is_two_sided: Booleans
 
     def of(self, chosen: NDArray[np.intp] | slice) -> _Pairs:
-        """Those of them."""
         return _Pairs(*(getattr(self, name)[chosen] for name in _Pairs.__slots__))
 
 
@@ -146,17 +136,14 @@ def _rows(sums: Floats, values: Floats, quoted: Quoted | None, column: int) -> _
 
 
 def _exact(sums: Floats) -> Floats:
-    """Sums (n, G) as multiples of a power of two, so that no sum of them, signs turned, is rounded.
-
-    They lose nothing that the sum of all had not lost: the last of 52 binary digits of Σ|S|. So ranges do not
-    depend on the order of entries.
-    """
+    """Round sums (n, G) to multiples of a power of two, so that no signed sum of them is rounded."""
+    # Only the last of 52 binary digits of Σ|S| is lost. Ranges then do not depend on the order of entries.
     _, exponents = np.frexp(np.abs(sums).sum(axis=1, keepdims=True))
     return np.asarray(np.ldexp(np.rint(np.ldexp(sums, _DIGITS - exponents)), exponents - _DIGITS))
 
 
 def _count_significant(rows: _Rows, signs: Floats, between: Callable[[], None]) -> tuple[Integers, Integers]:
-    """Count for every row how many are significantly better, and how many worse: step-down over all pairs."""
+    """Count the rows significantly better and worse than each row, by step-down over all pairs."""
     blocks = []
     for start in range(0, len(rows.values), _ROWS):
         between()
@@ -177,7 +164,7 @@ def _count_significant(rows: _Rows, signs: Floats, between: Callable[[], None]) 
 
 
 def _measured(rows: _Rows, start: int) -> _Pairs:
-    """The pairs of some rows with all before them, by ΣD² = Q_aa + Q_bb − 2 Q_ab."""
+    # By ΣD² = Q_aa + Q_bb − 2 Q_ab.
     own = rows.sums[start : start + _ROWS]
     stop = start + len(own)
     nth, earlier = np.tril_indices(len(own), start - 1, stop)
@@ -205,7 +192,7 @@ def _measured(rows: _Rows, start: int) -> _Pairs:
 
 
 def _largest_up_to(turned: Weights, pairs: _Pairs, between: Callable[[], None]) -> Weights:
-    """In every draw the largest rise over the first 0, 1, 2, … blocks, and over all opposites."""
+    """Compute for every draw the largest t over the first 0, 1, 2, … blocks, and over all opposites."""
     rises = [np.zeros(turned.shape[1], dtype=np.float32)]
     opposite = rises[0]
     for start in range(0, len(pairs.t), _BLOCK):
@@ -217,10 +204,7 @@ def _largest_up_to(turned: Weights, pairs: _Pairs, between: Callable[[], None]) 
 
 
 def _largest(turned: Weights, pairs: _Pairs) -> tuple[Weights, Weights]:
-    """In every draw how far the worse of a pair rises above the better at most, in standard errors.
-
-    And the opposite, of two-sided pairs; neither is below 0.
-    """
+    """Find for each draw the largest t of the pairs and of their two-sided opposites; both at least 0."""
     rise, fall = np.zeros((2, turned.shape[1]), dtype=np.float32)
     for first in range(0, turned.shape[1], _DRAWS):
         draws = slice(first, first + _DRAWS)

@@ -23,13 +23,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Means per TTC range, counts, and the number of predictions that were truncated to each boundary.
+    """Means per TTC range, counts, and the number of predictions truncated to each boundary.
 
-    `scores` runs as the protocol's `range_names`: overall, crucial, …. Only on request, and no part of the
-    JSON: `sequences`, by metric the errors of every sequence, float64 (n,) in the manifest's order, `details`
-    and `bags`. Of a hidden split none of them leaves the worker. `by`, `frame` and `plot` need a report made
-    with `keep_sequences=True`.
+    `scores` follow the protocol's `range_names`: overall, crucial, …. Only on request: `sequences` (by metric
+    the errors, float64 (n,), in the manifest's order), `details` and `bags`; these are never part of the
+    JSON. `by`, `frame` and `plot` need `keep_sequences=True`.
     """
+
+    # For a hidden split, `sequences`, `details` and `bags` never leave the worker.
 
     protocol: str
     truth_digest: str
@@ -59,7 +60,6 @@ class Report:
         return "\n".join([*lines, f"{counted(self.n_sequences, 'sequence')}, protocol {self.protocol}"])
 
     def _repr_html_(self) -> str:
-        """The table of a notebook."""
         header, *rows = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in self._rows()]
         body = "".join(f"<tr>{row}</tr>" for row in rows)
         head = f"<tr>{header.replace('td>', 'th>')}</tr>"
@@ -67,7 +67,6 @@ class Report:
         return f"<table><thead>{head}</thead><tbody>{body}</tbody></table><p>{words}</p>"
 
     def _rows(self) -> list[list[str]]:
-        """The header, then a row for each TTC range, as texts."""
         metrics = list(self.scores[OVERALL].means)
         rows = [["TTC range", *(metric_of(name).heading for name in metrics), "count"]]
         for name, score in self.scores.items():
@@ -82,10 +81,10 @@ class Report:
     def breakdown(
         self, by: str, *, with_intervals: bool = False, unit: str | None = None
     ) -> list[GroupScores]:
-        """The scores of each group: `by` is recording, camera, range, occlusion, lane or box-size.
+        """Score each group: `by` is recording, camera, range, occlusion, lane or box-size.
 
-        `unit` is as in `confidence_intervals`. Raises `ValueError` for another `by`, a ground truth without
-        what the groups need, and a report without sequences.
+        `unit` is as in `confidence_intervals`. Raises `ValueError` for another `by`, or if the truth or
+        report lacks the data.
         """
         details = self.require_details()
         return scores_of(
@@ -99,9 +98,9 @@ class Report:
         )
 
     def by(self, group: str, *, with_intervals: bool = False) -> pd.DataFrame:
-        """The same as a frame, indexed by the group: columns `n_sequences`, `n_recordings`, then the scores.
+        """Return `breakdown` as a frame by group: `n_sequences`, `n_recordings`, scores. Needs pandas.
 
-        With intervals each score has two more columns, as `mid_low` and `mid_high`. Needs pandas.
+        With intervals, each score has two more columns, such as `mid_low` and `mid_high`.
         """
         import pandas as pd  # noqa: PLC0415 -- of an extra
 
@@ -117,10 +116,9 @@ class Report:
         return pd.DataFrame(rows).set_index(group)
 
     def records(self) -> dict[str, list[object]]:
-        """A column for each fact of a sequence, in the manifest's order: keys, times in seconds, errors.
+        """Return keys, times (seconds), errors and object annotations as columns, in the manifest's order.
 
-        What the annotations say of the object is added where they say it. Raises `ValueError` for a report
-        without sequences.
+        Raises `ValueError` for a report without sequences.
         """
         details = self.require_details()
         table = details.truth.to_table()
@@ -140,7 +138,7 @@ class Report:
         }
 
     def frame(self) -> pd.DataFrame:
-        """Every sequence as a row, by the columns of `records`, indexed by anno_id. Needs pandas."""
+        """Return one row per sequence with the columns of `records`, indexed by anno_id. Needs pandas."""
         import pandas as pd  # noqa: PLC0415 -- of an extra
 
         return pd.DataFrame(self.records()).set_index("anno_id")
@@ -148,10 +146,10 @@ class Report:
     def plot(
         self, kind: str = "error", *, path: str | Path | None = None, name: str = "", **others: Report
     ) -> Figure:
-        """Draw `kind`: `error` (by true TTC, with a band), `scatter` or `distribution`; needs matplotlib.
+        """Draw `kind`: `error` (by true TTC, with a band), `scatter` or `distribution`. Needs matplotlib.
 
-        With `path` the figure is written there (.svg, .pdf, .png). Further reports, by the names that the
-        legend shows, are drawn beside this one, which `name` names.
+        `path` (.svg, .pdf, .png) also saves the figure. `name` and the keywords of further reports form the
+        legend.
         """
         from evaluator.scoring import plots  # noqa: PLC0415 -- matplotlib is of an extra
 
@@ -159,7 +157,7 @@ class Report:
         return plots.draw(kind, {key: report.require_details() for key, report in reports.items()}, path=path)
 
     def require_details(self) -> Details:
-        """The details, or a `ValueError` that says how to get them."""
+        """Return the details; raises `ValueError` that says how to get them."""
         if self.details is None:
             raise ValueError(
                 "The report has no errors of single sequences; call evaluate(…, keep_sequences=True)."
@@ -167,7 +165,7 @@ class Report:
         return self.details
 
     def as_dict(self) -> dict[str, object]:
-        """The report as plain data, in the shape of `tsttc score --json`."""
+        """Return the report as plain data, in the shape of `tsttc score --json`."""
         return {
             "protocol": self.protocol,
             "truth_digest": self.truth_digest,
@@ -179,11 +177,11 @@ class Report:
         }
 
     def to_json(self) -> str:
-        """The text of `as_dict()`, every float64 at full precision."""
+        """Return `as_dict()` as JSON, every float64 at full precision."""
         return json.dumps(self.as_dict(), allow_nan=False)
 
     def flat(self) -> dict[str, float | None]:
-        """The numbers under the protocol's `score_names`, in that order."""
+        """Return the numbers by the protocol's `score_names`, in that order."""
         return {
             score_name(metric, range_name): score.means[metric]
             for metric in self.scores[OVERALL].means

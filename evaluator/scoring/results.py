@@ -14,7 +14,7 @@ from evaluator.truth.ground_truth import GroundTruth
 
 @dataclass(frozen=True, slots=True)
 class RangeScore:
-    """Mean errors over one TTC range, by metric. One without sequences has no value: None, never 0."""
+    """Mean errors over one TTC range, by metric; values are None without sequences."""
 
     means: Mapping[str, float | None]
     count: int
@@ -30,17 +30,16 @@ class RangeScore:
         return self.means["rte"]
 
     def as_dict(self) -> dict[str, float | int | None]:
-        """The score as plain data. Written out: `dataclasses.asdict` copies for longer than scoring takes."""
+        """Return the score as plain data."""
+        # Written out, because `dataclasses.asdict` takes longer than scoring.
         return {**self.means, "count": self.count}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordingSums:
-    """Sums of errors per recording ("bag"), and how many sequences each sum has.
+    """Sums of errors and numbers of sequences per recording, float64 (recordings, score names)."""
 
-    Both are float64 (G, columns): the recordings as in `Manifest.recordings`, the columns as in the
-    protocol's `score_names`. For a hidden split they never leave the worker.
-    """
+    # For a hidden split they never leave the worker.
 
     sums: Floats
     counts: Floats
@@ -48,10 +47,9 @@ class RecordingSums:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Details:
-    """The inputs and the errors of each sequence of a report; of a hidden split they never leave the worker.
+    """Inputs and errors of each sequence, (n,), in the truth's order; `predicted_ttc_s` is truncated."""
 
-    `predicted_ttc_s`, truncated by the protocol, and the `errors` by metric are (n,), in the truth's order.
-    """
+    # For a hidden split they never leave the worker.
 
     truth: GroundTruth
     predictions: Predictions
@@ -62,11 +60,7 @@ class Details:
 
 @dataclass(frozen=True, slots=True)
 class GroupScores:
-    """The scores of one group by their names: None where it has no sequence of a TTC range.
-
-    `intervals` are the 95 % confidence intervals; None where there are too few days or recordings, or none
-    were asked for.
-    """
+    """The scores of one group by name, None where empty; `intervals` are at 95 %, None if absent."""
 
     group: str
     n_sequences: int
@@ -76,7 +70,7 @@ class GroupScores:
 
 
 def rounded(value: float | None, *, decimals: int = 2) -> float | None:
-    """`value` as it is published: correctly rounded, half to even on its exact binary value. None stays None.
+    """Round `value` for publication: half to even on its exact binary value. None stays None.
 
     >>> rounded(14.296), rounded(0.125), rounded(None)
     (14.3, 0.12, None)
@@ -89,7 +83,7 @@ def rounded(value: float | None, *, decimals: int = 2) -> float | None:
 
 
 def format_rounded(value: float | None, *, decimals: int = 2, missing: str = "–") -> str:
-    """The text of the published value with all its decimals, or `missing`.
+    """Format the published value with all its decimals, or `missing` for None.
 
     >>> format_rounded(14.296), format_rounded(None)
     ('14.30', '–')

@@ -1,19 +1,16 @@
 """Scoring: the metric specification of the TSTTC benchmark.
 
-The errors of each sequence, from the true time to contact τ (seconds from the target frame, never truncated)
-and the predicted τ̂ (truncated by the protocol), in float64:
+Errors of a sequence, from the true time to contact τ (seconds from the target frame, never truncated) and the
+predicted τ̂ (truncated by the protocol), in float64:
 
     α₁₀(τ) = 1 / ((1/(τ·10) + 1) + 10⁻⁶)
     MiD    = |ln α₁₀(τ) − ln α₁₀(τ̂)| · 10⁴
     RTE    = |(τ̂ − τ) / τ| · 100 %
 
-A score is the mean of an error over a range of the *true* τ, closed at both ends. `overall` is the mean over
-all sequences, also those in no range, beyond ±20 s. A range without sequences has no value. Which metrics and
-ranges there are says the protocol.
-
-`tsttc-1` truncates τ̂ to [−20, −0.15] ∪ [0.05, 20], to the nearest boundary of the same sign, so that
-α₁₀(τ̂) stays within [1/3, 3]. `toolkit` truncates to [−20, 20] only and refuses τ̂ whose α₁₀ is not positive
-and finite, where the dataset's toolkit crashes. Both refuse 0 and NaN, and truncate ±∞ to ±20.
+A score is the mean of an error over a closed range of the *true* τ; `overall` is the mean over all sequences,
+also beyond ±20 s. `tsttc-1` truncates τ̂ to [−20, −0.15] ∪ [0.05, 20], by sign, so that α₁₀(τ̂) is within
+[1/3, 3]. `toolkit` truncates to [−20, 20] and refuses τ̂ whose α₁₀ is not positive and finite, where the
+dataset's toolkit crashes. Both refuse 0 and NaN, and truncate ±∞ to ±20.
 """
 
 from __future__ import annotations
@@ -57,21 +54,19 @@ def evaluate(
 ) -> Report:
     """Score `predictions` against `truth`.
 
-    Raises `Rejected` for values that the protocol forbids, `TypeError` for other things than these,
-    `ValueError` for an unknown protocol and for predictions that were aligned with another manifest. With
-    `keep_sequences` the report carries the errors of every sequence and can look closer, with `keep_bags`
-    their sums per recording.
+    `keep_sequences` keeps the errors of every sequence, `keep_bags` the sums per recording. Raises `Rejected`
+    for values that the protocol forbids, `TypeError` for other objects, `ValueError` for an unknown protocol
+    or another manifest.
     """
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
     return Scorer(truth, rules).report(predictions, keep_sequences=keep_sequences, keep_bags=keep_bags)
 
 
 class Scorer:
-    """One truth under one protocol, ready for many predictions.
+    """One truth under one protocol, ready for many predictions."""
 
-    Works on the sequences in ascending τ, where an interval is a slice: the means are sums over contiguous
-    memory, which numpy adds pairwise, fast and accurate, and in the same order on every run.
-    """
+    # In ascending τ a TTC range is a slice: sums over contiguous memory are fast, accurate (numpy adds
+    # pairwise) and the same on every run.
 
     def __init__(self, truth: GroundTruth, protocol: Protocol) -> None:
         require(truth, GroundTruth, name="truth")
@@ -89,12 +84,10 @@ class Scorer:
 
     @cached_property
     def _recordings(self) -> NDArray[np.int64]:
-        """The recording of every sequence, in ascending τ."""
         return self._truth.manifest.recording_index[self._truth.ascending_rows]
 
     @cached_property
     def recording_counts(self) -> Floats:
-        """Sequences per recording in every column: the counts of all `RecordingSums` of this truth."""
         n_bags = self._truth.manifest.n_recordings
         parts = [self._recordings[part] for part in self._slices.values()] * len(self._protocol.metrics)
         counts = np.stack([np.bincount(part, minlength=n_bags) for part in parts], axis=1)
@@ -112,7 +105,7 @@ class Scorer:
     def report(
         self, predictions: Predictions, *, keep_sequences: bool = False, keep_bags: bool = False
     ) -> Report:
-        """The report on one set of predictions; raises as `evaluate` does."""
+        """Score one set of predictions; raises as `evaluate` does."""
         require(predictions, Predictions, name="predictions")
         if predictions.manifest is not self._truth.manifest:
             if predictions.manifest.digest != self._truth.manifest.digest:
@@ -151,7 +144,7 @@ class Scorer:
         return Details(self._truth, predictions, predicted_ttc_s, in_file_order, self._protocol)
 
     def _errors(self, predictions: Predictions) -> tuple[dict[str, Floats], tuple[int, ...]]:
-        """Errors by metric in ascending τ, and the number of predictions that went to each boundary."""
+        """Compute errors by metric in ascending τ, and the predictions truncated to each boundary."""
         truth = self._truth
         # Made with the first file of a truth, and better before the arrays below need memory too.
         true_log = truth.ascending_log_scale_ratio
@@ -167,7 +160,7 @@ class Scorer:
 
 
 def _truncate(ttc_s: Floats, protocol: Protocol) -> tuple[Floats, tuple[int, ...]]:
-    """The truncated values, a new array, and the number of changed values per boundary. 0 and NaN stay."""
+    """Truncate to a new array, and count the changes per boundary; 0 and NaN stay."""
     limit_s = protocol.limit_s
     truncated = np.clip(ttc_s, -limit_s, limit_s)
     n_low, n_high = int(np.count_nonzero(ttc_s < -limit_s)), int(np.count_nonzero(ttc_s > limit_s))
@@ -181,7 +174,6 @@ def _truncate(ttc_s: Floats, protocol: Protocol) -> tuple[Floats, tuple[int, ...
 
 
 def _refuse(predictions: Predictions, protocol: Protocol) -> NoReturn:
-    """Name the values that the protocol forbids, in file order."""
     findings = Findings()
     ttc_s, _ = _truncate(predictions.ttc_s, protocol)
     alpha = scale_ratio_10hz(ttc_s)
@@ -201,13 +193,13 @@ def _refuse(predictions: Predictions, protocol: Protocol) -> NoReturn:
 
 
 def floor_of(truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL) -> dict[str, float | None]:
-    """The scores of the ground truth itself; None for a TTC range without sequences."""
+    """Score the ground truth itself; None for an empty TTC range."""
     predictions = Predictions.from_arrays(ttc_s=truth.ttc_s, manifest=truth.manifest)
     return evaluate(predictions, truth, protocol=protocol).flat()
 
 
 def floor_sentence(floor: Mapping[str, float | None] | None, *, decimals: int = 2) -> str:
-    """The floor in words, from its published values; empty where it is not known, or 0 in every column.
+    """Describe the floor by its published values; empty if it is unknown or 0 everywhere.
 
     >>> print(floor_sentence({"mid": 0.36, "mid_crucial": 0.0, "rte": 0.73, "rte_crucial": 0.02}))
     Floor: the ground truth itself, submitted as predictions, scores MiD 0.36, RTE 0.73 %, RTE on crucial \

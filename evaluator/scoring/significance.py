@@ -22,7 +22,7 @@ _DETECTABLE: Final = (1.959964 + 0.841621) / 1.959964
 
 
 def p_below(p: float) -> float:
-    """The smallest of `P_CLASSES` that `p` is below, else 1. Of p as it was computed, never of a rounded one.
+    """Return the smallest of `P_CLASSES` that the unrounded `p` is below, else 1.
 
     >>> p_below(0.0004), p_below(0.0496), p_below(0.05)
     (0.001, 0.05, 1.0)
@@ -32,10 +32,9 @@ def p_below(p: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Influence:
-    """How many of the units (recordings or days) have to be left out before a difference is another one.
+    """The numbers of units to leave out until a difference changes; None if impossible.
 
-    `n_to_undecided`: until it is not significant, None where it is not; `n_to_turn`: until it has the other
-    sign, None where no units suffice.
+    `n_to_undecided`: until it is insignificant; `n_to_turn`: until it has the other sign.
     """
 
     n_units: int
@@ -45,12 +44,12 @@ class Influence:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """First minus second in one column: below 0 the first is better. Computed here or told by a server.
+    """First minus second in one column: below 0 the first is better.
 
-    `low` and `high` are its 95 % interval, `p` is the two-sided cluster sign-flip test's; None where there
-    are too few units. `p_below`, the smallest of `P_CLASSES` that p is below, else 1, is what judges, and all
-    that is told on hidden splits. `n_effective` is the effective number of units, `unit` what these are:
-    recording, day or given. `influence` says on how few of them the difference rests, where that is known.
+    `low` and `high` are its 95 % interval, `p` that of the two-sided sign-flip test; None for too few units.
+    `p_below` is the smallest of `P_CLASSES` above p, else 1; hidden splits show it alone. `n_effective` is
+    the effective number of units, `unit` their kind (recording, day or given), `influence` how few of them
+    decide.
     """
 
     difference: float
@@ -63,41 +62,37 @@ class Difference:
     unit: str = field(default=RECORDING, repr=False)
 
     def __post_init__(self) -> None:
-        """Give `p_below` where p says it."""
         if self.p_below is None and self.p is not None:
             object.__setattr__(self, "p_below", p_below(self.p))
 
     @property
     def is_significant(self) -> bool:
-        """Whether p is below 5 %: of this column alone, whatever else was looked at."""
+        """Whether p is below 5 %, uncorrected for other columns."""
         return self.p_below is not None and self.p_below <= SIGNIFICANT
 
     @property
     def detectable_difference(self) -> float | None:
-        """The smallest difference that such a test finds with a power of about 80 %: 1.43 half widths.
-
-        None for a difference that is significant, and where there is no interval.
-        """
+        """The difference detected with about 80 % power, 1.43 half widths; None if significant."""
         return None if self.is_significant else self.resolution
 
     @property
     def resolution(self) -> float | None:
-        """The same of any difference with an interval: how finely recordings tell methods apart."""
+        """The detectable difference also where it is significant: the resolution of the recordings."""
         if self.low is None or self.high is None:
             return None
         return _DETECTABLE * (self.high - self.low) / 2
 
     def turned(self) -> Difference:
-        """The same seen from the other side: second minus first."""
+        """Swap first and second."""
         low = None if self.high is None else 0.0 - self.high
         high = None if self.low is None else 0.0 - self.low
         return replace(self, difference=0.0 - self.difference, low=low, high=high)
 
 
 def best_of(n: int) -> float:
-    """By how much the best of `n` equally good variants looks better than it is, in standard errors.
+    """Compute the selection bias of the best of `n` equal variants, in standard errors of a difference.
 
-    That is, of the difference of two: the mean of the largest of n normal variables, divided by √2.
+    The mean of the largest of n normal variables, divided by √2.
 
     >>> [round(best_of(n), 2) for n in (1, 3, 10, 30, 100)]
     [0.0, 0.6, 1.09, 1.44, 1.77]
@@ -110,11 +105,10 @@ def best_of(n: int) -> float:
 
 
 def significant_together(differences: Sequence[Difference]) -> list[bool]:
-    """Which of several differences are significant with all of them tested together (Holm 1979).
+    """Test several differences together at 5 % (Holm 1979).
 
-    The smallest p is held against 0.05 / m, the next against 0.05 / (m − 1), until one is not below. Where
-    all are 0, any is significant in at most 5 % of cases. Where p is unknown, `p_below` counts as p. What has
-    neither is not tested.
+    The smallest p is compared with 0.05 / m, the next with 0.05 / (m − 1), until one is not below. `p_below`
+    replaces an unknown p; without either, a difference is not tested.
 
     >>> significant_together([Difference(-1, -2, -0.1, p) for p in (0.02, 0.01, 0.6)])
     [True, True, False]
@@ -133,12 +127,11 @@ def significant_together(differences: Sequence[Difference]) -> list[bool]:
 
 
 def _upper(difference: Difference) -> float | None:
-    """The p of a difference, else what it is below."""
     return difference.p_below if difference.p is None else difference.p
 
 
 def too_few_units(n_effective: float | None, *, unit: str = RECORDING) -> str:
-    """Why there is no interval and no p.
+    """Explain why there is no interval and no p.
 
     >>> too_few_units(7.99, unit="day")
     'too few days (effective number 7.9; at least 8 needed)'
@@ -150,5 +143,5 @@ def too_few_units(n_effective: float | None, *, unit: str = RECORDING) -> str:
 
 
 def cut_off(n_effective: float) -> float:
-    """An effective number with one decimal, not rounded: what is too few never reads as enough."""
+    """Format an effective number with one decimal, cut off: too few never reads as enough."""
     return math.floor(10 * n_effective) / 10

@@ -1,17 +1,15 @@
-"""Confidence intervals of means: a bootstrap over units, which are days or recordings.
+"""Confidence intervals of means: a Bayesian bootstrap over units (days or recordings).
 
-Sequences of one recording ("bag") resemble each other, and so do recordings of one day: units are drawn anew,
-never sequences. With S_g and n_g the sum of an error and the number of sequences of unit g, a published mean
-is θ = ΣS_g / Σn_g, and
+With S_g and n_g the sum of errors and the number of sequences of unit g, a published mean is θ = ΣS_g / Σn_g,
+and its resamples are
 
     θ⁽ᵇ⁾ = Σ w_bg S_g / Σ w_bg n_g        w_bg ~ Exp(1), b = 1 … B
 
-is what it might have been (a Bayesian bootstrap of units). An Exp(1) weight is never 0, so no interval
-of the ground truth runs empty. One matrix of weights is shared by all that is scored against a ground truth.
-
-Arrays have one row for each unit and one column for each score name; `by_units` makes them from those of
-recordings.
+Arrays have one row per unit and one column per score name.
 """
+
+# Sequences of one recording, and recordings of one day, are alike: units are resampled. An Exp(1) weight is
+# never 0, so no column is ever empty. All entries of a ground truth share one matrix of weights.
 
 from __future__ import annotations
 
@@ -36,16 +34,13 @@ Booleans = NDArray[np.bool_]
 
 
 def generator_of(digest: str, *, purpose: str) -> np.random.Generator:
-    """The random numbers that belong to a ground truth's revision; each purpose has its own."""
+    """Return the random numbers of a ground truth's revision, by purpose."""
     seed = hashlib.sha256(f"{purpose} {digest}".encode()).digest()
     return np.random.default_rng(int.from_bytes(seed))
 
 
 def by_units(rows: Floats, units: Units) -> Floats:
-    """Sums or counts of recordings (…, G, columns) as those of their units (…, U, columns).
-
-    Where the unit is the recording, they are the same array.
-    """
+    """Sum rows of recordings (…, G, columns) to rows of their units (…, U, columns)."""
     if units.kind == RECORDING:
         return rows
     index = np.array(units.index)
@@ -55,20 +50,14 @@ def by_units(rows: Floats, units: Units) -> Floats:
 
 
 def degrees_of(counts: Floats) -> Floats:
-    """The degrees of freedom of each column of `counts` (G, columns): its effective number of units.
-
-        (Σn²)² / Σn⁴
-
-    Satterthwaite's for a variance that is a sum of one square for each unit, with weights n². Units of equal
-    size count as many as they are; a few long ones among many short ones as little more than the few. 0 for
-    a column without sequences.
-    """
+    """Compute the effective number of units (Σn²)² / Σn⁴ of each column of `counts` (G, columns)."""
+    # Satterthwaite's degrees of freedom of a variance that sums one square per unit with weights n².
     squares, fourths = (counts**2).sum(axis=0), (counts**4).sum(axis=0)
     return np.asarray(np.divide(squares**2, fourths, out=np.zeros_like(squares), where=fourths > 0))
 
 
 def usable_columns(counts: Floats) -> Booleans:
-    """Which columns of `counts` (G, columns) have enough units: at least 8 degrees of freedom."""
+    """Find the columns of `counts` (G, columns) with at least 8 degrees of freedom."""
     return np.asarray(degrees_of(counts) >= MIN_DEGREES)
 
 
@@ -85,15 +74,12 @@ class Bootstrap:
 
     @cached_property
     def usable(self) -> Booleans:
-        """Which columns have enough units."""
         return usable_columns(self._counts)
 
     @cached_property
     def _tails(self) -> Floats:
-        """What lies beyond either end of an interval, of every column: less than 2.5 % for few units.
-
-        They count as (Σn)² / Σn² units of equal size for the mean, and as `degrees_of` for its error.
-        """
+        """Compute the share beyond either end of an interval, by column: below 2.5 % for few units."""
+        # (Σn)² / Σn² units of equal size for the mean, `degrees_of` for its error.
         squares = (self._counts**2).sum(axis=0)
         effective = np.divide(self._n**2, squares, out=np.ones_like(squares), where=squares > 0)
         pairs = zip(effective.tolist(), degrees_of(self._counts).tolist(), strict=True)
@@ -101,20 +87,17 @@ class Bootstrap:
 
     @cached_property
     def _inverse_counts(self) -> Weights:
-        """1 / Σwn of the usable columns in every resample, (usable, B)."""
         weighted = self._counts.T.astype(np.float32) @ self._weights
         return np.asarray(1 / weighted[self.usable])
 
     def means(self, sums: Floats) -> Floats:
-        """θ of every column, for sums (…, G, columns); NaN for a column without sequences."""
+        """Compute θ of every column from sums (…, G, columns); NaN without sequences."""
         with np.errstate(invalid="ignore"):
             return np.asarray(sums.sum(axis=-2) / self._n)
 
     def deviations(self, sums: Floats) -> Weights:
-        """θ⁽ᵇ⁾ − θ of the usable columns of some entries, float32 (entries, usable, B).
-
-        Σw(S − θn) / Σwn: centred before the product, so that nothing is lost where θ is large.
-        """
+        """Compute θ⁽ᵇ⁾ − θ of the usable columns, float32 (entries, usable, B)."""
+        # Σw(S − θn) / Σwn: centred before the product, so that a large θ costs no precision.
         centred = (sums - self.means(sums)[:, None, :] * self._counts)[:, :, self.usable]
         rows = np.ascontiguousarray(centred.transpose(0, 2, 1), dtype=np.float32)
         weighted = rows.reshape(-1, rows.shape[2]) @ self._weights
@@ -122,11 +105,8 @@ class Bootstrap:
         return np.asarray(np.multiply(shaped, self._inverse_counts, out=shaped))
 
     def intervals(self, sums: Floats) -> tuple[Floats, Floats]:
-        """The 95 % intervals of N entries by their `sums` (N, G, columns): quantiles of θ⁽ᵇ⁾.
-
-        Two (N, columns), NaN where there is none. Each is a function of its own entry alone: it is computed
-        in a product of one and the same shape, whoever else is on the board.
-        """
+        """Compute 95 % intervals of N entries by `sums` (N, G, columns): two (N, columns), NaN if absent."""
+        # The shape of the product is fixed, so that an interval never depends on other entries of the board.
         low = np.full((len(sums), sums.shape[2]), np.nan)
         high = low.copy()
         if not self.usable.any():
@@ -145,30 +125,26 @@ class Bootstrap:
 
 
 def _tail(n_effective: float, *, degrees: float) -> float:
-    """The share of resamples beyond either end of a 95 % interval of `n_effective` units of equal size.
-
-    Bare percentiles are those of a normal distribution whose variance is known, and n units scatter a
-    little less about their own mean than about the true one: Φ(−t(97.5 %) · √(n / (n − 1))), the expanded
-    percentiles of Hesterberg (The American Statistician 69, 2015), with Student's t of the degrees of freedom
-    that the variance is known by. Both are taken as 3 at least; below 8 degrees there is no interval anyway.
+    """Compute the share of resamples beyond either end of a 95 % interval of `n_effective` equal units.
 
     >>> round(_tail(1e9, degrees=1e9), 4), round(_tail(100.0, degrees=99.0), 4)
     (0.025, 0.0231)
     >>> round(_tail(20.0, degrees=10.0), 4)
     0.0111
     """
+    # Φ(−t(97.5 %) · √(n / (n − 1))), the expanded percentiles of Hesterberg (The American Statistician 69,
+    # 2015), with Student's t. Below 8 degrees there is no interval, so both numbers are at least 3 here.
     n = max(n_effective, 3.0)
     return NormalDist().cdf(-_student(max(degrees, 3.0)) * (n / (n - 1)) ** 0.5)
 
 
 def _student(degrees: float) -> float:
-    """The 97.5 % point of Student's distribution, right to 0.00003 from 8 degrees of freedom on.
-
-    From the normal one by the expansion of Fisher and Cornish (Technometrics 2, 1960) to the fourth order.
+    """Compute the 97.5 % point of Student's distribution, to 0.00003 for 8 degrees of freedom or more.
 
     >>> round(_student(8.0), 4), round(_student(19.0), 4)
     (2.306, 2.093)
     """
+    # Expansion of Fisher and Cornish (Technometrics 2, 1960) to the fourth order.
     z = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
     orders = (
         (z**3 + z) / 4,
@@ -180,7 +156,7 @@ def _student(degrees: float) -> float:
 
 
 def _ends(deviations: Weights, *, tail: float) -> Floats:
-    """The quantiles `tail` and 1 − `tail` of every row, (2, rows), as `numpy.quantile` takes them."""
+    """Compute the quantiles `tail` and 1 − `tail` of every row, (2, rows), as `numpy.quantile` does."""
     last = deviations.shape[1] - 1
     positions = [tail * last, (1 - tail) * last]
     indices = sorted({i for position in positions for i in (int(position), min(int(position) + 1, last))})
@@ -194,5 +170,4 @@ def _ends(deviations: Weights, *, tail: float) -> Floats:
 
 
 def bootstrap_of(truth_digest: str, counts: Floats) -> Bootstrap:
-    """The weights that belong to a ground truth's revision."""
     return Bootstrap(counts, rng=generator_of(truth_digest, purpose="weights"))

@@ -89,7 +89,7 @@ _WEB_ADDRESS: Final = re.compile(r"https?://[!-;=?-~]+")
 
 
 def one_line(text: str) -> str:
-    """A text on one line, without characters that cannot be seen or that turn others round.
+    """Put a text on one line, without invisible or direction-changing characters.
 
     >>> one_line("Deep\\n Scale\\u202e")
     'Deep Scale'
@@ -99,7 +99,7 @@ def one_line(text: str) -> str:
 
 
 def latex(text: str) -> str:
-    r"""A text as LaTeX prints it. What its first fonts lack comes as its code point.
+    r"""Escape a text for LaTeX; unsupported characters become code points.
 
     >>> print(latex("50 % of x_1 & Müller–Łoś β 中"))
     50 \% of x\_1 \& M\"{u}ller\textendash{}\L{}o\'{s} $\beta$ [U+4E2D]
@@ -124,12 +124,11 @@ def _latex_character(character: str) -> str:
 
 
 def latex_comment(text: str) -> str:
-    """A line that LaTeX does not read."""
     return f"% {one_line(text)}".rstrip()
 
 
 def markdown(text: str) -> str:
-    r"""A text as Markdown prints it, also in a table: no emphasis, no markup, no address turned into a link.
+    r"""Escape a text for Markdown and its tables: no markup, no automatic links.
 
     >>> print(markdown("a|b *c* <i> www.example.org"))
     a\|b \*c\* &lt;i&gt; www&#46;example.org
@@ -142,7 +141,7 @@ def markdown(text: str) -> str:
 
 
 def markdown_address(url: str) -> str:
-    """An address of ours as a link of Markdown; what is no such address, as text.
+    """Make a Markdown link of an own address; other text stays text.
 
     >>> print(markdown_address("https://example.org/board/test/?sort=rte"), markdown_address("<b>"))
     <https://example.org/board/test/?sort=rte> &lt;b&gt;
@@ -151,7 +150,7 @@ def markdown_address(url: str) -> str:
 
 
 def guarded(text: str) -> str:
-    """A text that no spreadsheet takes for a formula: an apostrophe precedes what might be one.
+    """Guard a text from being read as a formula by a spreadsheet.
 
     >>> guarded("=1+1"), guarded("Deep Scale"), guarded("A;=1+1;B")
     ("'=1+1", 'Deep Scale', "A;'=1+1;B")
@@ -161,7 +160,7 @@ def guarded(text: str) -> str:
 
 
 def csv_cell(value: object) -> str:
-    """A cell of a CSV table (RFC 4180): numbers as they are, texts guarded and quoted, None and "" empty.
+    """Format a cell of a CSV table (RFC 4180); texts are guarded and quoted, None is empty.
 
     >>> print(csv_cell(15.03), csv_cell("15.03"), csv_cell(None), csv_cell("A;=1"), csv_cell('a "b" c'))
     15.03 15.03  "A;'=1" "a ""b"" c"
@@ -176,5 +175,4 @@ def csv_cell(value: object) -> str:
 
 
 def csv_line(cells: Iterable[object], *, end: str = "\r\n") -> str:
-    """A row of a CSV table, with the end of its line."""
     return ",".join(map(csv_cell, cells)) + end

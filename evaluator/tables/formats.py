@@ -13,8 +13,6 @@ from evaluator.tables.layouts import Export, as_latex, as_markdown
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
-    """One way to export a board."""
-
     name: str
     """What the command calls it."""
     title: str
@@ -31,14 +29,13 @@ class Format:
 
 
 def csv_lines(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> Iterator[str]:
-    """Rows as CSV with a header (RFC 4180): texts guarded and quoted, numbers as they are, None empty."""
+    """Write rows as CSV with a header (RFC 4180): texts guarded and quoted, None empty."""
     yield ",".join(columns) + "\r\n"
     for row in rows:
         yield csv_line(row.get(name) for name in columns)
 
 
 def as_csv(export: Export) -> str:
-    """All rows of a board."""
     return "".join(csv_lines(export.records, columns=export.columns))
 
 
@@ -75,7 +72,7 @@ FORMATS: Final = (
 
 
 def parquet_of(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> bytes:
-    """Rows as a Parquet table with these columns. Raises `ModuleNotFoundError` without pyarrow."""
+    """Write rows as a Parquet table. Raises `ModuleNotFoundError` without pyarrow."""
     try:
         import pyarrow as pa  # noqa: PLC0415 -- of an extra
         from pyarrow import parquet  # noqa: PLC0415 -- of an extra

@@ -18,8 +18,6 @@ ABSENT: Final = "–"
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A value as it is printed, with its 95 % interval as two texts where there is one."""
-
     text: str
     low: str = ""
     high: str = ""
@@ -29,7 +27,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """An entry. `rank` may hold its range, as in "2 (1–3)"; there is a cell for each column."""
+    """An entry, with a cell per column; `rank` may include its range, as in "2 (1–3)"."""
 
     rank: str
     method: str
@@ -39,7 +37,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
-    """The source of a table. `address` keeps showing the same board; None is unknown."""
+    """The source of a table; `address` is permanent."""
 
     split: str
     address: str
@@ -56,12 +54,9 @@ class Origin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Export:
-    """A board as writers take it; each reads once what it needs.
+    """A board for the export formats: `rows` of a table, all `records` by `columns`, BibTeX `references`."""
 
-    `rows` are those of a table, without what was withdrawn, `records` all rows by the names of `columns`:
-    numbers as they are published, None where nothing is known. `references` are BibTeX entries of the papers
-    that rows name.
-    """
+    # `rows` leave out withdrawn entries; `records` have published numbers or None.
 
     origin: Origin
     rows: Iterable[Row]
@@ -72,7 +67,7 @@ class Export:
 
 
 def about(origin: Origin) -> tuple[str, ...]:
-    """The lines that stand above or below a table: enough to find it again when the board has moved on."""
+    """Describe the source of a table, so that a reader can retrieve it later."""
     lines = [f"TSTTC leaderboard, {origin.split}: {origin.address}"]
     if origin.edition is not None:
         facts = [f"Edition {origin.edition}"]
@@ -96,17 +91,15 @@ def about(origin: Origin) -> tuple[str, ...]:
 
 
 def mark_of(*, visibility: str, pseudonym: str | None) -> str:
-    """The mark of an own row that others do not see as it is; empty for any other row."""
     return "private" if visibility == "PRIVATE" else "anonymous" if pseudonym else ""
 
 
 def marked(name: str, mark: str) -> str:
-    """A name with the note of its row, as "Owl (private)"."""
     return f"{name} ({mark})" if mark else name
 
 
 def short_authors(authors: str) -> str:
-    """Authors as a table has room for them.
+    """Shorten authors for a table.
 
     >>> short_authors("Yuheng Shi, Zehao Huang, Yan Yan")
     'Shi et al.'
@@ -121,7 +114,7 @@ def short_authors(authors: str) -> str:
 
 
 def rank_text(rank: int | None, *, low: int | None = None, high: int | None = None) -> str:
-    """A rank, and behind it where the row may stand.
+    """Format a rank, with its range.
 
     >>> rank_text(2), rank_text(2, low=1, high=3), rank_text(1, low=1, high=1), rank_text(None)
     ('2', '2 (1–3)', '1 (1)', '–')
@@ -133,7 +126,7 @@ def rank_text(rank: int | None, *, low: int | None = None, high: int | None = No
 
 
 def as_latex(export: Export) -> str:
-    r"""A `tabular` of the package booktabs. The best of a column is bold, the second underlined."""
+    r"""Write a `tabular` of booktabs; the best of a column is bold, the second underlined."""
     rows, columns = list(export.rows), export.scores
     groups, rules, last = [], [], 3
     for metric, names in grouped_names(columns).items():
@@ -160,13 +153,11 @@ def as_latex(export: Export) -> str:
 
 
 def _caption(rows: Sequence[Row], origin: Origin) -> tuple[str, ...]:
-    """A sentence on the brackets of a table that has some."""
     has_some = any(cell.low and cell.high for row in rows for cell in row.cells)
     return (brackets(origin.unit, origin.n_units),) if has_some else ()
 
 
 def brackets(unit: str, n_units: int | None) -> str:
-    """A sentence on the brackets of a table with intervals."""
     return (
         f"In square brackets: 95 % confidence interval, bootstrap over {in_words(unit, n_units)}. In round "
         "brackets behind a rank: rank range at 95 %."
@@ -174,7 +165,6 @@ def brackets(unit: str, n_units: int | None) -> str:
 
 
 def latex_row(row: Row) -> str:
-    """One line of such a table, for one that is there already."""
     # The rank comes first: a row that began with a bracket or a star would speak to the \\ before it.
     texts = [_latex_number(row.rank), latex(row.method), latex(row.team), *map(_latex_cell, row.cells)]
     return rf"{' & '.join(texts)} \\"
@@ -192,11 +182,6 @@ def _latex_cell(cell: Cell) -> str:
 
 
 def _latex_unit(unit: str) -> str:
-    r"""A unit as LaTeX has it, a power of ten as mathematics.
-
-    >>> print(_latex_unit("×10⁻⁴"), _latex_unit("%"))
-    $\times 10^{-4}$ \%
-    """
     if not unit.startswith("×10"):
         return latex(unit)
     return rf"$\times 10^{{{unicodedata.normalize('NFKC', unit[3:]).replace('−', '-')}}}$"
@@ -207,7 +192,7 @@ def _latex_number(text: str) -> str:
 
 
 def as_markdown(export: Export) -> str:
-    """A table of GitHub's Markdown. The best of a column is bold, the second italic; below is its origin."""
+    """Write a table of GitHub's Markdown; the best of a column is bold, the second italic."""
     rows = list(export.rows)
     names = [f"{metric_of(name).symbol} {split_name(name)[1]}" for name in export.scores]
     units = ", ".join(metric.heading for metric in grouped_names(export.scores))

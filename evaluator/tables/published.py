@@ -59,15 +59,13 @@ _FIRST_HEADINGS: Final = {"camera-specification": "Camera", "nerf-scripts": "No.
 
 @dataclass(frozen=True, slots=True)
 class PrintedRow:
-    """The cells of a row as texts, and whether it is the paper's default."""
-
     cells: tuple[str, ...]
     is_default: bool
 
 
 @dataclass(frozen=True)
 class PrintedTable:
-    """A table as texts. The first `n_names` columns say what a row is about, the others hold its values."""
+    """A table as texts; the first `n_names` columns name a row, the others hold its values."""
 
     table: PublishedTable
     title: str
@@ -77,17 +75,14 @@ class PrintedTable:
 
     @property
     def n_results(self) -> int:
-        """The number of measured values."""
         return sum(len(row.values) for row in self.table.rows) if self.table.is_result else 0
 
     @property
     def caption(self) -> str:
-        """The paper's caption as a sentence."""
         return f"{self.table.caption.rstrip('.')}."
 
     @property
     def units(self) -> str:
-        """The units of its headings; empty for a table without results."""
         if not self.table.is_result:
             return ""
         metrics = dict.fromkeys(metric_of(name) for name in self.table.columns if name in SCORE_NAMES)
@@ -97,12 +92,10 @@ class PrintedTable:
 
 
 def printed_tables() -> tuple[PrintedTable, ...]:
-    """All tables of the paper, in its order."""
     return tuple(printed(table) for table in published_tables().tables)
 
 
 def printed(table: PublishedTable) -> PrintedTable:
-    """A table as texts."""
     names = _names(table)
     values = [_heading(table, column) for column in table.columns]
     rows = tuple(
@@ -113,7 +106,6 @@ def printed(table: PublishedTable) -> PrintedTable:
 
 
 def _names(table: PublishedTable) -> list[tuple[str, Callable[[PublishedRow], str]]]:
-    """Heading and text of the columns before the values: what the rows differ in."""
     if not table.is_result:
         return [(_FIRST_HEADINGS.get(table.name, ""), lambda row: _LABELS.get(str(row.key), str(row.key)))]
     name_columns: list[tuple[str, Callable[[PublishedRow], str]]] = []
@@ -127,13 +119,12 @@ def _names(table: PublishedTable) -> list[tuple[str, Callable[[PublishedRow], st
 
 
 def method_name(row: PublishedRow) -> str:
-    """The method of a row, as the paper prints it but without citations."""
+    """Name a row's method as the paper does, without citations."""
     name = published_tables().methods.get(row.method or "", row.method or "")
     return name.partition(" [")[0]
 
 
 def setting_text(row: PublishedRow) -> str:
-    """The setting of an ablation's row."""
     if isinstance(row.setting, bool):
         return "blurred" if row.setting else "not blurred"
     return f"{row.setting:,}" if isinstance(row.setting, int) else str(row.setting)
@@ -154,7 +145,7 @@ def _values(row: PublishedRow) -> Iterator[str]:
 
 
 def _value_text(value: Any) -> str:
-    """A value as it is printed; results have one decimal.
+    """Format a value; results have one decimal.
 
     >>> [_value_text(value) for value in (41.0, True, None, [-80, 80], [40, 60, 80], {"v_ego_minus": 20})]
     ['41.0', 'yes', '–', '−80 to 80', '40, 60, 80', 'ego − 20']
@@ -169,7 +160,6 @@ def _value_text(value: Any) -> str:
 
 
 def _list_text(values: list[Any]) -> str:
-    """Sentences, the two ends of a range, or numbers."""
     texts = [_value_text(each) for each in values]
     if isinstance(values[0], str):
         return " ".join(f"{text.rstrip('.')}." for text in texts)
@@ -180,7 +170,7 @@ def _list_text(values: list[Any]) -> str:
 
 
 def as_csv(shown: PrintedTable) -> str:
-    """Rows with numbers as they are (RFC 4180); results have the names of scores, methods and settings."""
+    """Write rows as CSV (RFC 4180), with names of scores, methods and settings for programs."""
     table = shown.table
     if not table.is_result:
         head = [name or "name" for name in shown.headings]
@@ -194,7 +184,7 @@ def as_csv(shown: PrintedTable) -> str:
 
 
 def as_latex(shown: PrintedTable) -> str:
-    r"""A `tabular` of the package booktabs; the row of the paper's default is bold."""
+    r"""Write a `tabular` of booktabs; the paper's default is bold."""
     n_values = len(shown.headings) - shown.n_names
     kind = "r" if shown.table.is_result else "l"
     rows = (
@@ -219,7 +209,7 @@ def as_latex(shown: PrintedTable) -> str:
 
 
 def as_markdown(shown: PrintedTable) -> str:
-    """A table of GitHub's Markdown; the row of the paper's default is bold. Notes and source are below."""
+    """Write a table of GitHub's Markdown; the paper's default is bold."""
     rule = "---:" if shown.table.is_result else "---"
     rules = ["---"] * shown.n_names + [rule] * (len(shown.headings) - shown.n_names)
     rows = (
@@ -236,12 +226,10 @@ def _markdown_line(cells: Iterable[str]) -> str:
 
 
 def as_json(shown: PrintedTable) -> str:
-    """The document of `document` as text."""
     return json.dumps(document(shown), ensure_ascii=False, indent=2) + "\n"
 
 
 def document(shown: PrintedTable) -> dict[str, Any]:
-    """One table with its values as numbers, for programs: what the API answers and `--json` prints."""
     table = shown.table
     return {
         "name": table.name,
@@ -269,7 +257,6 @@ def document(shown: PrintedTable) -> dict[str, Any]:
 
 
 def about(shown: PrintedTable, tables: PublishedTables | None = None) -> tuple[str, ...]:
-    """The source of a table, in one or two lines."""
     source = (tables or published_tables()).source
     default = " The paper's default is bold." if any(row.is_default for row in shown.rows) else ""
     return (

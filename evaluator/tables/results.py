@@ -16,10 +16,7 @@ Ends = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class ResultRow:
-    """The scores of one file, or of one group of its sequences, by their names; None has no value.
-
-    `units` says in words what the intervals take as independent, as "42 days".
-    """
+    """The scores of a file or group by name, None without value; `units` of the intervals, as "42 days"."""
 
     file: str
     group: str | None
@@ -31,7 +28,6 @@ class ResultRow:
 
 
 def names_of(rows: Sequence[ResultRow], *, by: str | None) -> list[tuple[str, Callable[[ResultRow], str]]]:
-    """The columns of names that a table needs: of the file where there are several, and of the group."""
     columns: list[tuple[str, Callable[[ResultRow], str]]] = []
     if len({row.file for row in rows}) > 1 or by is None:
         columns.append(("file", lambda row: row.file))
@@ -41,7 +37,7 @@ def names_of(rows: Sequence[ResultRow], *, by: str | None) -> list[tuple[str, Ca
 
 
 def as_csv(rows: Sequence[ResultRow], *, by: str | None) -> str:
-    """CSV (RFC 4180) with all digits; ends of intervals as `mid_low` and `mid_high`."""
+    """Write CSV (RFC 4180) with all digits; ends of intervals are `mid_low` and `mid_high`."""
     records = []
     for row in rows:
         record: dict[str, object] = {"file": row.file} | ({by: row.group} if by else {})
@@ -55,7 +51,6 @@ def as_csv(rows: Sequence[ResultRow], *, by: str | None) -> str:
 
 
 def as_markdown(rows: Sequence[ResultRow], *, by: str | None) -> str:
-    """A table of GitHub's Markdown."""
     names, scores = names_of(rows, by=by), list(rows[0].scores)
     heads = [title for title, _ in names] + _titles(scores) + ["sequences"]
     lines = [heads, ["---"] * len(names) + ["---:"] * (len(scores) + 1)]
@@ -66,7 +61,7 @@ def as_markdown(rows: Sequence[ResultRow], *, by: str | None) -> str:
 
 
 def as_latex(rows: Sequence[ResultRow], *, by: str | None) -> str:
-    """A tabular of booktabs; without its head, a row is one for a table that is there already."""
+    """Write a `tabular` of booktabs; without its head, rows for an existing table."""
     names, scores = names_of(rows, by=by), list(rows[0].scores)
     heads = [title for title, _ in names] + _titles(scores)
     return "\n".join(
@@ -89,7 +84,6 @@ def as_latex(rows: Sequence[ResultRow], *, by: str | None) -> str:
 
 
 def _caption(rows: Sequence[ResultRow]) -> str:
-    """The metrics of a table and, if it has brackets, their meaning."""
     metrics = ", ".join(metric.heading for metric in grouped_names(rows[0].scores))
     caption = f"{metrics}; lower is better."
     if not any(row.units and any(row.intervals.values()) for row in rows):
@@ -98,7 +92,6 @@ def _caption(rows: Sequence[ResultRow]) -> str:
 
 
 def cells_of(row: ResultRow) -> Iterator[str]:
-    """The scores as they are published, each with its interval where there is one."""
     from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy
 
     for name, value in row.scores.items():
@@ -110,7 +103,6 @@ def cells_of(row: ResultRow) -> Iterator[str]:
 
 
 def _titles(scores: Sequence[str]) -> list[str]:
-    """The heads of scores; where none is of a range, nothing is said of ranges."""
     parts = [split_name(name) for name in scores]
     has_ranges = any(range_name != OVERALL for _, range_name in parts)
     return [

@@ -15,7 +15,7 @@ _DECIMALS_IN_WORDS: Final = {1: "one decimal", 2: "two decimals"}
 
 
 def p_text(p: float | None, below: float | None = None) -> str:
-    """A p-value in words, with four decimals; the class that it is below if p itself is withheld.
+    """Format a p-value with four decimals, or as the class `below` if p is withheld.
 
     >>> p_text(0.0496), p_text(0.3), p_text(1.0)
     ('p = 0.0496', 'p = 0.3000', 'p = 1')
@@ -28,7 +28,7 @@ def p_text(p: float | None, below: float | None = None) -> str:
 
 
 def p_cell(p: float | None, below: float | None) -> str:
-    """The same for a table's column: four decimals, else the class; empty where there is neither.
+    """Format a p-value for a table; empty without p and class.
 
     >>> p_cell(0.0496, 0.05), p_cell(1.0, 1.0), p_cell(None, 0.01), p_cell(None, 1.0), p_cell(None, None)
     ('0.0496', '1.0000', '< 0.01', '≥ 0.05', '')
@@ -43,9 +43,9 @@ def p_cell(p: float | None, below: float | None) -> str:
 def sentence(
     first: str, second: str, *, name: str, difference: Difference, decimals: int = 2, withheld: str = ""
 ) -> str:
-    """A difference in one column as a sentence; `decimals` are those of published values.
+    """Describe a difference in one column; `decimals` are those of published values.
 
-    `withheld` says why there is no interval, in a sentence, where it is not for too few units.
+    `withheld` is the reason for a missing interval, by default too few units.
 
     >>> sentence("A", "B", name="mid_crucial", difference=Difference(-4.1, -5.3, -2.9, 0.0003))
     "A's MiD on crucial is 4.1 lower than B's (95 % confidence interval: 2.9 to 5.3 lower; p = 0.0003)."
@@ -89,7 +89,7 @@ def _direction(difference: float) -> str:
 
 
 def _ends(difference: float, low: float, high: float, digits: int) -> str:
-    """From the smaller effect to the larger one, each with its own direction where they have two."""
+    """Order an interval's ends by size, each with its direction if the directions differ."""
     near, far = (high, low) if difference < 0 else (low, high)
     start = _amount(near, digits)
     if near and (near < 0) != (far < 0):
@@ -98,13 +98,13 @@ def _ends(difference: float, low: float, high: float, digits: int) -> str:
 
 
 def _amount(value: float, digits: int) -> str:
-    """Its size; what is not 0 has at least one unit of the last digit."""
+    # What is not 0 has at least one unit of the last digit.
     unit = 10.0**-digits
     return f"{max(abs(value), unit) if value else 0.0:.{digits}f}"
 
 
 def _digits(difference: Difference, decimals: int) -> int:
-    """The decimals that give the half width two digits and show the difference; at most `decimals`."""
+    """Choose decimals, at most `decimals`, that show the difference and two digits of the half width."""
     if difference.low is None or difference.high is None:
         return decimals
     half = (difference.high - difference.low) / 2
@@ -114,7 +114,7 @@ def _digits(difference: Difference, decimals: int) -> int:
 
 
 def influence(first: str, second: str, *, difference: Difference) -> str:
-    """On how few units a difference rests; empty where that is not known.
+    """Say on how few units a difference rests; empty if unknown.
 
     >>> from evaluator.scoring.significance import Influence
     >>> difference = Difference(-0.4, -0.5, -0.2, 0.0003, influence=Influence(700, 39, 59))
@@ -139,9 +139,7 @@ def influence(first: str, second: str, *, difference: Difference) -> str:
 
 
 def selection(n_tried: Mapping[str, int]) -> str:
-    """A sentence on selection among several submissions, for methods and their numbers of scored submissions.
-
-    Empty where nothing was chosen.
+    """Describe selection among submissions, by methods' numbers of scored submissions; empty without any.
 
     >>> print(selection({"A": 3, "B": 1, "C": 10}))
     A is the best of 3 scored submissions, C of 10: the best of so many equally good variants looks better \
@@ -165,7 +163,7 @@ than it is by about 0.60 and 1.09 standard errors of the difference of two of th
 
 
 def resolution(pairs: Sequence[Mapping[str, Difference]], *, decimals: int = 2) -> str:
-    """The resolution of each column, from the differences of neighbours on a board; empty without any.
+    """Describe each column's resolution by the differences of neighbours on a board; empty without any.
 
     >>> some = [{"mid": Difference(-1, -2, 0, 0.1), "rte": Difference(-1, -1.5, -0.5, 0.01)}]
     >>> print(resolution(some))
@@ -189,7 +187,7 @@ def resolution(pairs: Sequence[Mapping[str, Difference]], *, decimals: int = 2) 
 
 
 def others(differences: Mapping[str, Difference]) -> str:
-    """The number of columns besides overall MiD that differ significantly; empty if no column has a p.
+    """Count the columns besides overall MiD that differ significantly; empty if no column has a p.
 
     >>> alike, far = Difference(0.1, -0.2, 0.4, 0.5), Difference(-4.1, -5.3, -2.9, 0.0003)
     >>> others({"mid": far, "mid_small": alike, "rte": alike})

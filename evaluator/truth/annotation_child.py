@@ -1,9 +1,8 @@
-"""The child process in which annotation files are read: `python -m evaluator.truth.annotation_child`.
+"""The child process that reads annotation files: `python -m evaluator.truth.annotation_child`.
 
-It writes `READY` to its standard output. Its standard input then gives it files, each as a line of JSON
-(`name`, `n_bytes`) and its content; it answers each with an empty line. At the end of its input it writes the
-sequences of all of them as one line of JSON, or the problems of the first file at fault. Like the child that
-reads prediction files it gives up everything else first.
+It gives up its rights and writes `READY`. Each file on standard input, a line of JSON (`name`, `n_bytes`) and
+its content, gets an empty line. At the end it writes all sequences, or the problems of the first faulty file,
+as a line of JSON.
 """
 
 import json
@@ -18,7 +17,7 @@ from evaluator.truth.annotations import read_files
 
 
 def files_of(source: IO[bytes], answers: IO[bytes]) -> Iterator[tuple[str, bytes]]:
-    """The files that come in, each answered when the next is asked for."""
+    """Yield the files; each is answered when the next is asked for."""
     while line := source.readline():
         header = json.loads(line)
         yield header["name"], source.read(int(header["n_bytes"]))
@@ -27,7 +26,7 @@ def files_of(source: IO[bytes], answers: IO[bytes]) -> Iterator[tuple[str, bytes
 
 
 def warm_up() -> None:
-    """Run every branch that imports late, since nothing can be opened afterwards."""
+    # Late imports: nothing can be opened afterwards.
     try:
         read_files([("", b"cos\nsystem\n.")], with_ttc=True)
     except Rejected as rejected:
@@ -35,7 +34,7 @@ def warm_up() -> None:
 
 
 def main() -> None:
-    """Arguments: memory in bytes, processor time in seconds, and 1 or 0: true times, boxes, all frames."""
+    """Run with memory in bytes, processor time in seconds, and three flags: true times, boxes, all frames."""
     obey_the_parent_alone()
     warm_up()
     with_ttc, with_boxes, with_frames = (argument == "1" for argument in sys.argv[3:6])

@@ -1,13 +1,12 @@
-"""Folders of annotation files: which files there are, in which order, and their sequences.
+"""Folders of annotation files: their order and their sequences.
 
-anno_ids are numbered from 0 over the files **sorted by their path** inside the folder; the toolkit numbers
-them in the order in which the file system lists the files, which differs between machines.
-
-On Linux the pickles are read by a child process that has little memory and time, and may open nothing
-(`annotation_child`); its answer is believed no more than the files are. Other systems have no such limits,
-and the files are read here: no pickle runs code, but one that was made for it may take all memory, or never
-end.
+anno_ids count from 0 over the files **sorted by path**; the toolkit takes the file system's order, which
+differs between machines.
 """
+
+# On Linux a child process with little memory and time reads the pickles (`annotation_child`), and its answer
+# is checked like the files. Elsewhere they are read here, without limits: no pickle runs code, but a
+# malicious one may exhaust memory or never end.
 
 from __future__ import annotations
 
@@ -59,12 +58,11 @@ _EXPECTED: Final = "expected annotations of the toolkit"
 def read_annotations(
     folder: Path, *, with_ttc: bool, with_boxes: bool = False, with_frames: bool = False
 ) -> AnnotatedFiles:
-    """Cut the sequences out of every `*.pkl` below `folder`; one row per sequence, from its target frame.
+    """Read the sequences of every `*.pkl` below `folder`, one row each, from its target frame.
 
-    Without `with_ttc`, targets may lack `ttc_imu` (the public test set does) and the column stays empty.
-    With `with_boxes`, the boxes of all frames are read too; with `with_frames`, their times to contact.
-    Raises `Rejected` for a folder without such files, for files that cannot be read or ask for more memory or
-    time than their size warrants, for pickles that ask for foreign code and for files of another structure.
+    `with_ttc` requires `ttc_imu` in targets (the public test set lacks it); `with_boxes` and `with_frames`
+    read the boxes and times of all frames. Raises `Rejected` for a folder without such files and for
+    unreadable, malicious or malformed files.
     """
     listed = list_files(folder)
     if not listed:
@@ -79,7 +77,7 @@ def read_annotations(
 
 
 def list_files(folder: Path) -> list[Path]:
-    """The annotation files below `folder`, in the order in which the toolkit would read them here."""
+    """List the annotation files below `folder` in the order of the toolkit on this machine."""
 
     def cannot_list(error: OSError) -> None:
         where = Path(error.filename).name if error.filename else folder.name
@@ -95,7 +93,6 @@ def list_files(folder: Path) -> list[Path]:
 
 
 def _contents(folder: Path, files: Sequence[Path]) -> Iterator[tuple[str, bytes]]:
-    """Name and content of each file, one at a time."""
     for path in files:
         name = path.relative_to(folder).as_posix()
         try:
@@ -126,7 +123,6 @@ def _read_here(
 def _read_apart(
     folder: Path, files: Sequence[Path], *, with_ttc: bool, with_boxes: bool, with_frames: bool
 ) -> AnnotatedFiles:
-    """The same by a child process, which gets one file after the other."""
     sizes = [min(path.stat().st_size, MAX_FILE_BYTES) for path in files]
     memory_bytes = _BASE_BYTES + _BYTES_PER_BYTE * max(sizes)
     cpu_s = _BASE_CPU_S + sum(sizes) // _BYTES_PER_CPU_S
@@ -208,7 +204,6 @@ def _last_words(child: subprocess.Popen[bytes]) -> str:
 
 
 def _end_of(child: subprocess.Popen[bytes], *, memory_bytes: int) -> tuple[str, str]:
-    """Why the child ended, as code and message."""
     import signal  # noqa: PLC0415 -- as READY
 
     from evaluator.limits import EXIT_OUT_OF_MEMORY  # noqa: PLC0415 -- as READY
@@ -225,7 +220,6 @@ def _end_of(child: subprocess.Popen[bytes], *, memory_bytes: int) -> tuple[str, 
 
 
 def _decoded(line: bytes, where: str) -> AnnotatedFiles:
-    """The child's answer; raises `Rejected` when that is what it says, or when it says nothing known."""
     try:
         answer: dict[str, Any] = json.loads(line)
         if "problems" in answer:
@@ -240,7 +234,6 @@ def _decoded(line: bytes, where: str) -> AnnotatedFiles:
 
 
 def _table(columns: dict[str, Any]) -> Table:
-    """Raises `TypeError` or `ValueError` for columns of another kind or length than `Table` says."""
     table = Table(**columns)
     for name, kinds in _KINDS.items():
         column = getattr(table, name)

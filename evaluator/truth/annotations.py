@@ -1,8 +1,8 @@
-"""The toolkit's annotation files: pickles from strangers, read without running them.
+"""The toolkit's annotation files: untrusted pickles, read without running them.
 
-An annotation file holds a list of dictionaries, one per camera: timestamp -> list of attribute-dicts with
-`bag_stamp, box2d, cam_id, id, occ_ratio, same_lane, ts, ttc_imu`. A sequence is six frames of one id, exactly
-0.1 s apart, cut without overlap; its target is the last frame.
+A file is a list of dictionaries, one per camera: timestamp -> list of attribute-dicts with `bag_stamp, box2d,
+cam_id, id, occ_ratio, same_lane, ts, ttc_imu`. A sequence is six frames of one id, exactly 0.1 s apart,
+without overlap; its target is the last frame.
 """
 
 from __future__ import annotations
@@ -24,12 +24,11 @@ Camera = dict[float, list[Attributes]]
 
 @dataclass(frozen=True, slots=True)
 class AnnotatedFiles:
-    """The sequences of some files, in their order: a row for each, and how many each file has.
+    """The sequences of some files in order, one row each, and the number in each file.
 
-    `listed` is the order in which the file system lists the files of a folder: indices of the sorted ones.
-    `boxes` holds, where they are asked for, the 24 numbers of each sequence: x1, y1, x2, y2 of its frames in
-    the order of time, as parts of the image's width and height; `frame_ttc_s` likewise the 6 times to contact
-    of each in seconds, NaN where a frame has none.
+    `listed` are indices of the sorted files, in the file system's order. On request, `boxes` has x1, y1, x2,
+    y2 of all six frames (parts of the image's width and height), `frame_ttc_s` their times in seconds, NaN if
+    absent.
     """
 
     table: Table
@@ -53,13 +52,7 @@ def read_files(
     with_boxes: bool = False,
     with_frames: bool = False,
 ) -> AnnotatedFiles:
-    """Cut the sequences out of annotation files, given by name and content; one row each, from its target.
-
-    Without `with_ttc`, targets may lack `ttc_imu` (the public test set does) and the column stays empty, as
-    those of `OBJECT_COLUMNS` do. With `with_boxes`, every frame needs its `box2d`; with
-    `with_frames`, the times to contact of all frames are read, which need not have one.
-    Raises `Rejected` for pickles that ask for foreign code and for files of another structure.
-    """
+    """Read the sequences of annotation files, by name and content, as `read_annotations` does."""
     table, findings, locations, n_sequences = Table(), Findings(), list[str](), list[int]()
     boxes, frame_ttc_s = list[list[float]](), list[list[float]]()
     for name, data in files:
@@ -79,10 +72,8 @@ def read_files(
 
 
 def cut_sequences(camera: Camera, *, n_frames: int = N_FRAMES) -> Iterator[list[Attributes]]:
-    """The sequences of one camera in the toolkit's order: by the frame that completes them, then by track.
-
-    A track that skips a frame starts anew; a complete sequence starts the next one with an empty hand.
-    """
+    """Cut one camera's sequences in the toolkit's order: by completing frame, then by track."""
+    # A gap restarts a track. A complete sequence shares no frame with the next one.
     open_tracks: dict[object, list[Attributes]] = {}
     for stamp in sorted(camera):
         for seen in camera[stamp]:
@@ -97,7 +88,6 @@ def cut_sequences(camera: Camera, *, n_frames: int = N_FRAMES) -> Iterator[list[
 
 
 def _cameras(data: bytes, name: str) -> list[Camera]:
-    """The cameras of one annotation file, with their structure checked."""
     cameras = load_plain(data, where=name)
     fault = _structure_fault(cameras)
     if fault:
@@ -190,13 +180,11 @@ def _add_row(table: Table, target: Attributes, findings: Findings, where: str, *
 
 
 def _ttc_s(seen: Attributes) -> float:
-    """The true time to contact of a frame, NaN where it has none."""
     ttc_s = seen.get("ttc_imu")
     return float(cast("float", ttc_s)) if _is_number(ttc_s) else math.nan
 
 
 def _box(seen: Attributes, findings: Findings, where: str) -> list[float]:
-    """The four numbers of `box2d`."""
     box = seen.get("box2d")
     numbers = _numbers(box)
     if numbers is not None:
@@ -207,7 +195,6 @@ def _box(seen: Attributes, findings: Findings, where: str) -> list[float]:
 
 
 def _numbers(box: object) -> list[float] | None:
-    """The four numbers of an array, a list or a tuple; None for anything else."""
     numbers = box.numbers if isinstance(box, FewNumbers) else box
     if isinstance(numbers, list | tuple) and len(numbers) == 4 and all(map(_is_number, numbers)):
         return [float(number) for number in numbers]

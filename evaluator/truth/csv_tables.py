@@ -44,10 +44,9 @@ _NUMBER: Final = re.compile(
 
 @dataclass(slots=True)
 class Table:
-    """Columns as they were read, one item per sequence, and the place of each row for messages.
+    """Columns as read, one item per sequence, and the source row of each for messages.
 
-    Those of `OBJECT_COLUMNS` and `unit` are empty where the source does not have them; None in the former is
-    a missing value.
+    `OBJECT_COLUMNS` and `unit` are empty if the source lacks them; None in the former is a missing value.
     """
 
     anno_id: list[int] = field(default_factory=list)
@@ -64,18 +63,18 @@ class Table:
 
     @property
     def manifest_columns(self) -> tuple[str, ...]:
-        """The columns of its manifest: with `unit` where it has that."""
+        """The columns of its manifest, with `unit` if present."""
         return (*MANIFEST_COLUMNS, UNIT) if self.unit else MANIFEST_COLUMNS
 
     def where(self, row: int) -> str:
-        """`line 3` of a CSV, or whatever the source calls the row."""
+        """Return `line 3` of a CSV, or the source's name of the row."""
         if not self.locations:
             return f"row {row + 1}"
         location = self.locations[row]
         return location if isinstance(location, str) else f"line {location}"
 
     def text(self, columns: tuple[str, ...], *, order: list[int] | None = None) -> str:
-        """The table as CSV text in the given row order, times to contact in their shortest exact spelling."""
+        """Return the table as CSV text in this row order, times to contact in shortest exact form."""
         lines = self._lines(columns)
         return _text(columns, lines if order is None else [lines[row] for row in order])
 
@@ -93,11 +92,8 @@ class Table:
         return list(map(",".join, zip(*(values[name] for name in columns), strict=True)))
 
     def digests(self) -> tuple[str, str]:
-        """`sha256:…` of the texts of the manifest and of the whole table, rows in ascending anno_id.
-
-        The latter is empty where there are no times to contact. A table without units has the digests that
-        it had before there were any.
-        """
+        """Compute `sha256:…` of the manifest's text and of the whole table's (empty without times)."""
+        # In ascending anno_id. A missing column `unit` does not change a digest.
         columns = self.manifest_columns
         lines = self._lines(columns)
         whole = list(map(",".join, zip(lines, map(repr, self.ttc_s), strict=True))) if self.ttc_s else []
@@ -118,10 +114,8 @@ def _digest(columns: tuple[str, ...], lines: list[str]) -> str:
 
 @lru_cache(maxsize=4096)  # the same few names stand in thousands of rows
 def name_fault(text: str) -> str | None:
-    """Why `text` cannot be a bag_stamp, cam_id or track_id; None when it can.
-
-    These words are joined by "/" in natural keys and by "," in tables, so they must be free of both.
-    """
+    """Explain why `text` cannot be a bag_stamp, cam_id or track_id, else None."""
+    # Natural keys join these words by "/", tables by ",".
     if not text:
         return "it is empty"
     if len(text) > _MAX_FIELD:
@@ -135,7 +129,6 @@ def name_fault(text: str) -> str | None:
 
 
 def read_text(source: Source) -> str:
-    """The text of a UTF-8 file, with or without a byte order mark. Raises `Rejected`."""
     try:
         return data_of(source).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -144,12 +137,8 @@ def read_text(source: Source) -> str:
 
 
 def read_csv(source: Source, *, with_ttc: bool) -> Table:
-    """Read `COLUMNS` from a CSV file with a header; more columns are ignored, their order is free.
-
-    Also `unit` where it is there, and with `with_ttc` those of `OBJECT_COLUMNS`.
-
-    Raises `Rejected` for an unreadable file, missing columns and malformed fields, by line.
-    """
+    """Read a CSV table; raises `Rejected`, by line, for missing columns and malformed fields."""
+    # `COLUMNS` and `unit`, for a ground truth also `OBJECT_COLUMNS`; other columns are ignored.
     text = read_text(source)
     columns = COLUMNS if with_ttc else MANIFEST_COLUMNS
     rows = csv.reader(io.StringIO(text, newline=""), strict=True)
@@ -157,11 +146,6 @@ def read_csv(source: Source, *, with_ttc: bool) -> Table:
         return _read_rows(rows, columns)
     except csv.Error as error:
         raise reject("bad-csv", f"This is not a CSV table: {error}.", f"line {rows.line_num}") from None
-
-
-def _of_objects(header: list[str], columns: tuple[str, ...]) -> dict[str, int]:
-    """The positions of the object columns; empty for a manifest."""
-    return {name: header.index(name) for name in OBJECT_COLUMNS if name in header and "ttc" in columns}
 
 
 def _read_rows(rows: Any, columns: tuple[str, ...]) -> Table:
@@ -176,7 +160,7 @@ def _read_rows(rows: Any, columns: tuple[str, ...]) -> Table:
         )
     columns = (*columns, UNIT) if UNIT in header else columns
     positions = {name: header.index(name) for name in columns}
-    extra = _of_objects(header, columns)
+    extra = {name: header.index(name) for name in OBJECT_COLUMNS if name in header and "ttc" in columns}
     table, findings, locations = Table(), Findings(), []
     for row in rows:
         if not row:
@@ -235,7 +219,7 @@ def save_store(
     manifest_digest: str,
     truth_digest: str | None = None,
 ) -> None:
-    """Write columns and digests as an `.npz` without pickled objects, not compressed for speed."""
+    """Write columns and digests as `.npz`, without pickles and uncompressed."""
     arrays: dict[str, Any] = {
         "manifest_digest": np.array(manifest_digest),
         **columns,
@@ -247,7 +231,7 @@ def save_store(
 
 
 def load_store(path: str | os.PathLike[str], *, with_ttc: bool) -> tuple[Table, str, str]:
-    """The table, the manifest's digest and the truth's, if any; raises `Rejected` for other files."""
+    """Read a table, the manifest's digest and the truth's, if any; raises `Rejected` for other files."""
     path = Path(path)
     try:
         # numpy leaves its own file open when it fails.

@@ -1,13 +1,11 @@
-"""The ground truth of a split, and its public half, the manifest.
+"""The ground truth of a split, and its public part, the manifest.
 
-A `Manifest` says which sequences a split has; a `GroundTruth` adds the true time to contact of each. Both
-are read from CSV (`anno_id,bag_stamp,cam_id,ts,track_id,ttc`, ts in ns), from files written by `save`, and
-from the toolkit's annotation folders.
+Both are read from CSV (`anno_id,bag_stamp,cam_id,ts,track_id,ttc`, ts in ns), from files written by `save`,
+and from the toolkit's annotation folders.
 
-Both are named by a digest, "sha256:" and the hex SHA-256 of their canonical text: the header line, then one
-line per sequence in ascending anno_id, fields separated by commas, times to contact as the shortest decimal
-that reads back to the same float64, lines ended by a line feed. The order of the rows therefore does not
-change the digest. A column `unit`, where there is one, stands in the manifest, before the times to contact.
+Their digest is "sha256:" and the hex SHA-256 of a canonical text: the header, then a line per sequence in
+ascending anno_id, fields separated by commas (`unit` before the time, if present), times as the shortest
+decimal that reads back exactly, lines ended by a line feed.
 """
 
 from __future__ import annotations
@@ -36,9 +34,9 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Manifest:
-    """The sequences of a split in file order, all that participants may know. Arrays are (n,), read-only.
+    """The public description of a split's sequences, in file order. Arrays are (n,), read-only.
 
-    `unit` is empty unless the ground truth names the unit of every recording.
+    `unit` is empty unless the ground truth names a unit for every recording.
     """
 
     anno_id: Integers
@@ -97,12 +95,12 @@ class Manifest:
 
     @cached_property
     def anno_id_keys(self) -> tuple[str, ...]:
-        """The anno_ids as they are written in a prediction file."""
+        """The anno_ids as keys of a prediction file."""
         return tuple(map(str, self.anno_id.tolist()))
 
     @cached_property
     def rows_by_id(self) -> NDArray[np.intp] | slice:
-        """The rows in ascending anno_id, an index for arrays: all of them where they stand so already."""
+        """The rows in ascending anno_id, as an index for arrays."""
         if (self.anno_id[1:] > self.anno_id[:-1]).all():
             return slice(None)
         return np.argsort(self.anno_id)
@@ -124,7 +122,7 @@ class Manifest:
 
     @cached_property
     def recording_index(self) -> Integers:
-        """For every sequence, the index of its recording in `recordings`."""
+        """The index in `recordings` of every sequence."""
         index = {bag: i for i, bag in enumerate(self.recordings)}
         array = np.array([index[bag] for bag in self.bag_stamp], dtype=np.int64)
         array.setflags(write=False)
@@ -132,22 +130,22 @@ class Manifest:
 
     @property
     def n_recordings(self) -> int:
-        """Number of distinct recordings (bag_stamps)."""
+        """Number of distinct bag_stamps."""
         return len(self.recordings)
 
     @cached_property
     def units(self) -> Units:
-        """The units of `recordings`, by the rule: those of the column `unit`, else days, else recordings."""
+        """The units of `recordings`: column `unit`, else days, else recordings."""
         return self.units_by(None)
 
     def units_by(self, kind: str | None) -> Units:
-        """The units of one kind, or by the rule. Raises `ValueError` where these recordings have no such."""
+        """Return the units of one kind, or by the rule; raises `ValueError` if the recordings lack them."""
         return units_of(
             self.recordings, given=dict(zip(self.bag_stamp, self.unit, strict=bool(self.unit))), kind=kind
         )
 
     def to_table(self) -> Table:
-        """The columns as lists, without times to contact."""
+        """Return the columns as lists, without times to contact."""
         return Table(
             anno_id=self.anno_id.tolist(),
             bag_stamp=list(self.bag_stamp),
@@ -158,7 +156,7 @@ class Manifest:
         )
 
     def to_csv(self) -> bytes:
-        """The public table: a header and one row per sequence in file order, UTF-8, ended by line feeds."""
+        """Write the public table: a header and a row per sequence in file order, UTF-8, line feeds."""
         table = self.to_table()
         return table.text(table.manifest_columns).encode()
 
@@ -168,7 +166,6 @@ class Manifest:
 
     @cached_property
     def _columns(self) -> dict[str, NDArray[Any]]:
-        """The arrays that `save` writes, here and in the ground truth."""
         return {
             "anno_id": self.anno_id,
             "bag_stamp": np.array(self.bag_stamp, dtype=np.str_),
@@ -180,10 +177,7 @@ class Manifest:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Manifest:
-        """Read what `save` wrote; raises `Rejected` when it is damaged or does not match its digest.
-
-        The file of a `GroundTruth` serves as well; its values are left aside.
-        """
+        """Read what `save` wrote, also of a `GroundTruth`; raises `Rejected` for damage or another digest."""
         table, digest, _ = load_store(path, with_ttc=False)
         manifest = cls.from_table(table)
         _check_digest(stored=digest, actual=manifest.digest, path=path)
@@ -194,7 +188,7 @@ class Manifest:
 class GroundTruth:
     """One revision of the hidden values: the manifest, and τ in seconds, float64 (n,), read-only.
 
-    `objects` is what the source states beside; the digest does not contain it, and `save` leaves it out.
+    `objects` are further annotations, outside of the digest and of `save`.
     """
 
     manifest: Manifest
@@ -208,7 +202,7 @@ class GroundTruth:
 
     @classmethod
     def from_table(cls, table: Table) -> GroundTruth:
-        """Check rows and values; raises `Rejected` naming the rows at fault."""
+        """Check rows and values; raises `Rejected` that names the rows at fault."""
         manifest_digest, digest = table.digests()
         manifest = Manifest._checked(table, manifest_digest)
         ttc_s = np.array(table.ttc_s, dtype=np.float64)
@@ -238,23 +232,23 @@ class GroundTruth:
         return exact_log(scale_ratio_10hz(self.ascending_ttc_s))
 
     def counts_of(self, intervals: Iterable[TTCRange]) -> dict[str, int]:
-        """Sequences of each TTC range by its name; those at an end that two share count twice."""
+        """Count the sequences of each TTC range by name; a shared end counts twice."""
         return {i.name: int(np.count_nonzero(_inside(self.ttc_s, i.low_s, i.high_s))) for i in intervals}
 
     def n_outside(self, intervals: Iterable[TTCRange]) -> int:
-        """Sequences that lie in none of these TTC ranges."""
+        """Count the sequences outside of these TTC ranges."""
         inside = [_inside(self.ttc_s, i.low_s, i.high_s) for i in intervals]
         return self.n_sequences - int(np.count_nonzero(np.logical_or.reduce(inside)))
 
     def to_table(self) -> Table:
-        """The columns as lists."""
+        """Return the columns as lists."""
         table = self.manifest.to_table()
         table.ttc_s = self.ttc_s.tolist()
         table.occ_ratio, table.same_lane, table.box2d = self.objects.to_columns()
         return table
 
     def to_csv(self) -> bytes:
-        """The whole table with τ, in file order, as `read_truth` reads it; what is known of objects too."""
+        """Write the whole table with τ and objects in file order, for `read_truth`."""
         table = self.to_table()
         known = tuple(name for name in OBJECT_COLUMNS if getattr(table, name))
         return table.text((*table.manifest_columns, "ttc", *known)).encode()
@@ -266,7 +260,7 @@ class GroundTruth:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> GroundTruth:
-        """Read what `save` wrote; raises `Rejected` when it is damaged or does not match its digest."""
+        """Read what `save` wrote; raises `Rejected` for damage or another digest."""
         table, _, digest = load_store(path, with_ttc=True)
         truth = cls.from_table(table)
         _check_digest(stored=digest, actual=truth.digest, path=path)
@@ -274,11 +268,10 @@ class GroundTruth:
 
 
 def read_truth(source: Source) -> GroundTruth:
-    """Read ground truth from a CSV file, a saved `.npz`, or a folder of the toolkit's `*.pkl` annotations.
+    """Read ground truth from CSV, a saved `.npz`, or a folder of the toolkit's `*.pkl` annotations.
 
-    `source` is a path, or the bytes of a CSV file or the file itself, open. Rows keep the order of the file.
-    Raises `Rejected`, with line numbers, for duplicate ids or natural keys, malformed fields, non-finite τ
-    and −0.1 ≤ τ ≤ 0, where MiD is undefined.
+    `source` is a path, the bytes of a CSV file, or an open file; row order is kept. Raises `Rejected` for
+    duplicate ids or natural keys, malformed fields, non-finite τ and −0.1 ≤ τ ≤ 0, where MiD is undefined.
     """
     if _is_store(source):
         return GroundTruth.load(source)
@@ -286,7 +279,7 @@ def read_truth(source: Source) -> GroundTruth:
 
 
 def read_manifest(source: Source) -> Manifest:
-    """Read a manifest from any source that `read_truth` takes; true times may be absent, and are ignored."""
+    """Read a manifest from any source of `read_truth`; true times may be absent and are ignored."""
     if _is_store(source):
         return Manifest.load(source)
     return Manifest.from_table(_table_of(source, with_ttc=False))
@@ -334,7 +327,7 @@ def _find_duplicates(findings: Findings, code: str, noun: str, keys: Sequence[st
 
 
 def _find_two_units(findings: Findings, table: Table) -> None:
-    """A recording lies in one unit: its sequences are not independent of each other."""
+    # Sequences of one recording are dependent, so a recording has one unit.
     first: dict[str, int] = {}
     for row, (recording, unit) in enumerate(zip(table.bag_stamp, table.unit, strict=bool(table.unit))):
         earlier = first.setdefault(recording, row)

@@ -1,8 +1,7 @@
-"""The anno_ids that the toolkit gives the sequences of a folder on this machine, next to those of a manifest.
+"""The toolkit's anno_ids on this machine, compared with a manifest's."""
 
-The toolkit numbers over the files in the order in which the file system lists them, a manifest over the
-sorted files; within a file the order is the same.
-"""
+# The toolkit counts over files in the file system's order, a manifest over sorted files; within a file both
+# agree.
 
 from __future__ import annotations
 
@@ -22,14 +21,14 @@ from evaluator.truth.ground_truth import Manifest
 
 @dataclass(frozen=True, eq=False)
 class Numbering:
-    """A manifest, and for each anno_id of the toolkit, 0 to n - 1, the row of the manifest: (n,)."""
+    """A manifest, and for each anno_id of the toolkit, 0 to n - 1, the manifest's row: (n,)."""
 
     manifest: Manifest
     rows: NDArray[np.intp]
 
     @property
     def n_renumbered(self) -> int:
-        """The number of anno_ids for which the toolkit and the manifest name different sequences."""
+        """The number of anno_ids that name different sequences in toolkit and manifest."""
         return int(np.count_nonzero(self.manifest.anno_id[self.rows] != np.arange(len(self.rows))))
 
     @cached_property
@@ -39,20 +38,17 @@ class Numbering:
         return {str(anno_id): keys[row] for anno_id, row in enumerate(self.rows.tolist())}
 
     def realigned(self, ttc_s: Floats) -> Floats:
-        """Values of a file with anno_ids, aligned by the manifest's, (n,): the same by the toolkit's.
-
-        The manifest's anno_ids are 0 to n - 1, as those of every folder are.
-        """
+        """Reorder values (n,) by the toolkit's anno_ids that were aligned by the manifest's, 0 to n - 1."""
         values = np.empty_like(ttc_s)
         values[self.rows] = ttc_s[np.argsort(self.manifest.anno_id, kind="stable")]
         return values
 
 
 def read_numbering(folder: str | Path, *, manifest: Manifest | None = None) -> Numbering:
-    """How the toolkit numbers the sequences of an annotation folder on this machine.
+    """Read how the toolkit numbers an annotation folder on this machine, compared with `manifest`.
 
-    It is compared with that of `manifest`, or of the manifest that is made from the folder. Raises
-    `Rejected` for a folder that cannot be read, and where folder and manifest have different sequences.
+    Without `manifest`, the folder's own is made. Raises `Rejected` for an unreadable folder or different
+    sequences.
     """
     folder = Path(folder)
     annotated = read_annotations(folder, with_ttc=False)
@@ -69,7 +65,7 @@ def read_numbering(folder: str | Path, *, manifest: Manifest | None = None) -> N
 
 
 def require_the_same(own: Sequence[str], wanted: Sequence[str], where: str) -> None:
-    """Raise `Rejected` where a folder's natural keys are not those of a manifest, whatever their order."""
+    """Raise `Rejected` if the natural keys of folder and manifest differ."""
     findings = Findings()
     for code, missing, words in (
         ("missing-keys", sorted(set(wanted) - set(own)), "The folder lacks sequences of the manifest ({})"),

@@ -1,8 +1,7 @@
-"""What annotations state about the object of a sequence in the target frame, except its time to contact.
+"""Annotations of the object in the target frame, for offline analyses; scores and digests ignore them.
 
-`occ_ratio` (how much of it is occluded, 0 to 1), `same_lane` (whether it drives in the lane of the camera's
-car) and `box2d` (x1, y1, x2, y2 as parts of the image's width and height). No score and no digest depends on
-them; offline analyses group by them.
+`occ_ratio` is the occluded part (0 to 1), `same_lane` whether the object is in the lane of the camera's car,
+`box2d` x1, y1, x2, y2 as parts of the image's width and height.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ _FARTHEST: Final = 2.0  # a box may be partly outside the image; beyond this it 
 
 @dataclass(frozen=True, eq=False)
 class Objects:
-    """The columns as float64 arrays, NaN where nothing is stated; None where the source has no such column.
+    """Annotations as float64 arrays, NaN where missing; None without the column.
 
     `occ_ratio` and `same_lane` (1 or 0) are (n,), `box2d` is (n, 4).
     """
@@ -46,7 +45,7 @@ class Objects:
         same_lane: Sequence[bool | None],
         box2d: Sequence[Sequence[float] | None],
     ) -> Objects:
-        """From the columns of a table; one without any value is absent."""
+        """Read the columns of a table; an empty one is absent."""
         return cls(
             occ_ratio=_floats(occ_ratio),
             same_lane=_floats(same_lane),
@@ -54,7 +53,6 @@ class Objects:
         )
 
     def to_columns(self) -> tuple[list[float | None], list[bool | None], list[list[float] | None]]:
-        """The columns of a table, in the order of `OBJECT_COLUMNS`."""
         return (
             [None if math.isnan(value) else value for value in _items(self.occ_ratio)],
             [None if math.isnan(value) else value == 1 for value in _items(self.same_lane)],
@@ -63,7 +61,6 @@ class Objects:
 
     @property
     def box_height(self) -> Floats | None:
-        """Height of the boxes as a part of the image's height, (n,)."""
         return None if self.box2d is None else self.box2d[:, 3] - self.box2d[:, 1]
 
 
@@ -83,7 +80,7 @@ def _floats(column: Sequence[Any]) -> Floats | None:
 
 
 def occ_ratio_of(text: str) -> float | None:
-    """The occluded part.
+    """Parse the occluded part.
 
     >>> occ_ratio_of("0.25"), occ_ratio_of("")
     (0.25, None)
@@ -101,7 +98,7 @@ def occ_ratio_of(text: str) -> float | None:
 
 
 def same_lane_of(text: str) -> bool | None:
-    """Whether the object drives in the same lane.
+    """Parse whether the object is in the same lane.
 
     >>> same_lane_of("1"), same_lane_of("False"), same_lane_of("")
     (True, False, None)
@@ -114,7 +111,7 @@ def same_lane_of(text: str) -> bool | None:
 
 
 def box2d_of(text: str) -> list[float] | None:
-    """Four numbers with spaces between them.
+    """Parse four numbers with spaces between them.
 
     >>> box2d_of("0.25 0.25 0.5 0.75"), box2d_of("")
     ([0.25, 0.25, 0.5, 0.75], None)
@@ -140,11 +137,7 @@ FIELDS: Final[dict[str, Callable[[str], Any]]] = {
 
 
 def text_of(value: float | bool | Sequence[float] | None) -> str:
-    """The field of a value, as the functions above read it.
-
-    >>> text_of(0.25), text_of(True), text_of([0.25, 0.25, 0.5, 0.75]), text_of(None)
-    ('0.25', '1', '0.25 0.25 0.5 0.75', '')
-    """
+    """Format a value as the functions above parse it."""
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -153,7 +146,6 @@ def text_of(value: float | bool | Sequence[float] | None) -> str:
 
 
 def is_box(box: Sequence[float]) -> bool:
-    """Whether these four numbers are a box in parts of an image."""
     if len(box) != 4 or not all(abs(number) <= _FARTHEST for number in box):  # NaN is not either
         return False
     x1, y1, x2, y2 = box
@@ -164,14 +156,12 @@ def is_box(box: Sequence[float]) -> bool:
 
 
 def plain_occ_ratio(value: object) -> float | None:
-    """A number from 0 to 1."""
     if isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value <= 1:
         return float(value)
     return None
 
 
 def plain_same_lane(value: object) -> bool | None:
-    """True or False, also as 1 or 0."""
     if isinstance(value, bool) or (isinstance(value, int | float) and value in (0, 1)):
         return bool(value)
     return None

@@ -1,10 +1,8 @@
-"""Reading a pickle that names nothing but data.
+"""Reading a pickle that names only data."""
 
-What a pickle asks for by name is answered here: with Python's containers, and with classes of this module in
-place of attribute-dicts and of numpy's types. Nothing is imported, and nothing that outlives it is changed:
-each class here has a `__setstate__`, so that the unpickler sets no attributes. What a pickle costs is **not**
-bounded here: `annotation_child` reads files within the limits of its process.
-"""
+# Every name in a pickle is answered by Python's containers or a class of this module, so nothing is imported.
+# Each class has a `__setstate__`, so that the unpickler changes no lasting attribute. Memory and time are
+# **not** limited here, but in the process of `annotation_child`.
 
 from __future__ import annotations
 
@@ -26,12 +24,8 @@ _NUMERIC: Final = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|c8|c16)")
 
 
 def load_plain(data: bytes, *, where: str) -> object:
-    """The value that the pickle in `data` describes; raises `Rejected`, at `where`, for anything beyond plain
-    data, and MemoryError.
-
-    Attribute-dicts come back as `Attributes`, numpy scalars as Python numbers, ordered and default dicts as
-    dicts, and arrays as `FewNumbers`.
-    """
+    """Load a pickle of plain data; raises `Rejected` at `where` for anything else, and MemoryError."""
+    # Attribute-dicts become `Attributes`, numpy scalars numbers, other dicts dicts, arrays `FewNumbers`.
     try:
         # A buffered reader can be peeked into, so that the unpickler does not ask for each few bytes.
         return _Unpickler(io.BufferedReader(io.BytesIO(data)), encoding="latin-1").load()
@@ -51,7 +45,7 @@ class Attributes(dict[Any, Any]):
     __slots__ = ()
 
     def __setstate__(self, state: Any) -> None:
-        """Make items of what the foreign class has kept as attributes, where it has no such items."""
+        # Foreign classes may keep their items as attributes.
         for part in state if isinstance(state, tuple) else (state,):
             for name, value in dict(part or {}).items():
                 self.setdefault(name, value)
@@ -80,7 +74,7 @@ class FewNumbers:
 
     @property
     def numbers(self) -> list[float] | None:
-        """The numbers as they stand in memory, whatever the shape; None for an array of many."""
+        """The numbers as stored, without shape; None for a long array."""
         if self._dtype is None:
             return None
         try:
@@ -90,7 +84,7 @@ class FewNumbers:
 
 
 class _Dtype:
-    """The type of a number; not numpy's, which all arrays of a program share."""
+    # Not numpy's type, which all arrays of a program share.
 
     __slots__ = ("kind",)
     kind: np.dtype[Any]
@@ -111,7 +105,7 @@ class _Dtype:
 
 
 class _Made:
-    """What makes other things than itself. No state is set, neither of one nor of the class."""
+    """A class whose calls make other objects; neither has state."""
 
     __slots__ = ()
 
@@ -130,14 +124,14 @@ class _DefaultDict(_Made):
 
 
 class _Encoded(_Made):
-    """How old pickles write bytes: a text to be encoded as Latin-1, or nothing."""
+    # Old pickles write bytes as a text to encode as Latin-1, or nothing.
 
     def __new__(cls, text: str = "", _encoding: object = None) -> Any:
         return str.encode(text, "latin-1")
 
 
 class _Reconstructed(_Made):
-    """How old pickles make an object: its class, the base of its class, and the base's content."""
+    # Old pickles make an object from its class, the base of its class, and the base's content.
 
     def __new__(cls, made: Any, *base_and_content: Any) -> Any:
         return made(*(content for content in base_and_content[1:] if content is not None))
@@ -174,7 +168,6 @@ _ALLOWED: Final[dict[tuple[str, str], type]] = {
 
 class _Unpickler(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> type:
-        """The class of a name; raises `Rejected` for anything that is not data."""
         allowed = _ALLOWED.get((_ALIASES.get(module, module), name))
         if allowed is not None:
             return allowed

@@ -3,5 +3,5 @@
     annotation = annotate(read_tracks(Path("track.csv")))
     Path("truth.csv").write_text(annotation.text())
 
-It needs numpy alone.
+It needs only numpy.
 """

@@ -25,11 +25,8 @@ REASONS: Final = {
 
 
 def choose(ttc_s: Floats, radar_ttc_s: Floats) -> tuple[NDArray[np.intp], NDArray[np.str_]]:
-    """For each of n frames the index of the window that is taken, and the reason, a key of `REASONS`.
-
-    `ttc_s` (m, n) has the time to contact of each window in seconds, the longest window last, NaN where a
-    window has none. `radar_ttc_s` (n,) has the radar's, NaN where there is none. Distances are MiD.
-    """
+    """Choose each frame's window by MiD to `radar_ttc_s` (n,): index, and key of `REASONS`."""
+    # `ttc_s` (m, n) is in seconds by window, the longest last; NaN if absent.
     n_windows, n = ttc_s.shape
     spread = np.zeros(n)
     for first in range(n_windows):
@@ -44,7 +41,6 @@ def choose(ttc_s: Floats, radar_ttc_s: Floats) -> tuple[NDArray[np.intp], NDArra
 
 
 def _distance(ttc_s: Floats, other_s: Floats) -> Floats:
-    """MiD between times to contact; infinite where one is NaN or so near to 0 that it has none."""
     with np.errstate(invalid="ignore"):
         distance = MID.errors(ttc_s, other_s)
     return np.where(np.isnan(distance), np.inf, distance)

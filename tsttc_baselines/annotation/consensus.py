@@ -1,8 +1,7 @@
-"""The velocity of a depth over the past frames: a line through most of them, or through all.
+"""The velocity of a depth over past frames: a line through most of them (RANSAC), or through all."""
 
-The paper draws pairs of frames at random (RANSAC). A window has at most ten frames, so all 45 pairs are tried
-here, for many windows at once: the result is the same every time and faster.
-"""
+# The paper draws pairs at random. A window has at most ten frames, so all 45 pairs are tried: deterministic
+# and faster.
 
 from __future__ import annotations
 
@@ -27,10 +26,9 @@ _AT_ONCE: Final = 4096
 
 @dataclass(frozen=True, slots=True)
 class Velocities:
-    """What the windows say, arrays (n,): `mps` in m/s, NaN where there is none, and the frames behind it.
+    """Velocities of n windows: `mps` in m/s, NaN if absent, and the frames behind it."""
 
-    `depth_m` is where the last frame is: as measured if it is an inlier, and on the line if it is not.
-    """
+    # `depth_m` is the last frame's depth: as measured for an inlier, else on the line.
 
     mps: Floats
     depth_m: Floats
@@ -41,13 +39,12 @@ class Velocities:
 def consensus_velocity(
     time_s: Floats, depth_m: Floats, is_there: Bools, *, inlier_m: float = INLIER_M
 ) -> Velocities:
-    """The velocity of the line with which most frames agree, in each of n windows.
+    """Fit the line with most inliers in each of n windows; NaN for fewer than three frames.
 
-    Arrays are (q, n), the frames of a window in the order of time; those that are not `is_there` do not
-    count. The line goes through two frames; of lines with equally many inliers the one of the earliest frames
-    is taken, and the velocity is the least-squares slope over its inliers. Windows with fewer than three
-    frames have none.
+    Arrays are (q, n), frames in order of time; those not `is_there` are ignored.
     """
+    # Candidate lines go through two frames; ties go to the earliest. The velocity is the least-squares slope
+    # of the inliers.
     parts = [
         _consensus(time_s[:, part], depth_m[:, part], is_there[:, part], inlier_m)
         for part in _slices(time_s.shape[1])
@@ -56,10 +53,8 @@ def consensus_velocity(
 
 
 def least_squares_velocity(time_s: Floats, depth_m: Floats, is_there: Bools) -> Velocities:
-    """The slope over all frames of each window; arguments, and what it gives, as for `consensus_velocity`.
-
-    For windows of three frames: two of three always agree, so a consensus would say nothing.
-    """
+    """Fit the slope over all frames of each window; arguments as for `consensus_velocity`."""
+    # For windows of three frames: two of three always agree.
     n_frames = is_there.sum(axis=0)
     mps = np.where(n_frames >= MIN_FRAMES, _slopes(time_s, depth_m, is_there), np.nan)
     return Velocities(mps, depth_m[-1], n_frames, n_frames)
@@ -91,7 +86,7 @@ def _consensus(time_s: Floats, depth_m: Floats, is_there: Bools, inlier_m: float
 
 
 def _distances(time_s: Floats, depth_m: Floats, i: int, j: int) -> Floats:
-    """The distance of each frame from the line through the frames i and j, (q, n)."""
+    """Compute each frame's distance from the line through frames i and j, (q, n)."""
     slope = (depth_m[j] - depth_m[i]) / (time_s[j] - time_s[i])
     away = slope * (time_s - time_s[i])
     away -= depth_m
@@ -100,7 +95,6 @@ def _distances(time_s: Floats, depth_m: Floats, i: int, j: int) -> Floats:
 
 
 def _slopes(time_s: Floats, depth_m: Floats, counts: Bools) -> Floats:
-    """Least-squares slope of each column over the frames that count; NaN where they are fewer than two."""
     n_frames = counts.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         time = np.where(counts, time_s - np.where(counts, time_s, 0).sum(axis=0) / n_frames, 0.0)

@@ -12,10 +12,10 @@ _SIGNS: Final = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (
 
 
 def corners_m(centre_m: Floats, size_m: Floats, yaw_rad: Floats) -> Floats:
-    """The corners (n, 8, 3) of boxes with centres (n, 3), sizes (n, 3) and yaws (n,).
+    """Compute the corners (n, 8, 3) of boxes from centres (n, 3), sizes (n, 3) and yaws (n,).
 
-    Axes are x to the right, y forward, z up. The size is length, width, height; at yaw 0 the length lies
-    along x, and the yaw turns x towards y.
+    Axes: x right, y forward, z up. Size: length, width, height; at yaw 0 the length is along x, and the yaw
+    turns x towards y.
 
     >>> boxes = np.array([[0.0, 10.0, 0.0]]), np.array([[4.0, 2.0, 1.5]]), np.array([np.pi / 2])
     >>> [round(float(y), 6) for y in sorted(set(corners_m(*boxes)[0, :, 1].round(6)))]
@@ -35,10 +35,7 @@ def corners_m(centre_m: Floats, size_m: Floats, yaw_rad: Floats) -> Floats:
 
 
 def nearest_depth_m(centre_m: Floats, size_m: Floats, yaw_rad: Floats) -> Floats:
-    """y of the corner that is nearest to the origin, (n,): negative behind it.
-
-    Of corners that are equally near, the first counts. Arguments are those of `corners_m`.
-    """
+    """Compute y of the corner nearest to the origin, (n,); arguments as for `corners_m`."""
     corners = corners_m(centre_m, size_m, yaw_rad)
     nearest = np.argmin(np.square(corners).sum(axis=-1), axis=1)
     return np.asarray(corners[np.arange(len(corners)), nearest, 1])

@@ -2,7 +2,7 @@
 
     {recording}.txt    frame track type truncated occluded alpha x1 y1 x2 y2 h w l x y z rotation_y
 
-Coordinates are the camera's: x to the right, y down, z forward, the location in the middle of the bottom.
+Camera coordinates: x right, y down, z forward; the location is the bottom's middle.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ N_FIELDS: Final = 17
 
 
 def read_kitti(folder: Path) -> Tracks:
-    """The cars, vans and trucks of every `*.txt` in a folder of KITTI tracking labels, at 10 Hz.
+    """Read the cars, vans and trucks of a folder of KITTI tracking labels, at 10 Hz.
 
-    A recording is named by its file's stem, the camera is 2, and ts is the frame's number · 10⁸ ns.
-    Raises `Rejected`, by file and line, for a folder without such files, malformed lines, NaN, two rows of a
-    track for a frame, and rows of a track that are not in the order of time.
+    Raises `Rejected`, by file and line, for a folder without labels, and malformed, duplicate or unordered
+    rows.
     """
+    # Recordings are named by file stem; the camera is 2, ts the frame's number · 10⁸ ns.
     files = sorted(folder.glob("*.txt"))
     if not files:
         message = "The folder has no label files; expected KITTI tracking labels, one *.txt for a recording."

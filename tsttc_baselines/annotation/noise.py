@@ -1,9 +1,9 @@
-"""The noise of labels, from labels alone: successive ones of a vehicle should differ by the time between.
+"""The noise of labels, from labels alone.
 
     of_range = label_noise(*successive(truth.to_table()))
 
-While nothing accelerates, τ(t) = τ(t − 0.1 s) − 0.1 s. What is left of the difference is noise of two labels,
-less what both have in common: they are made from nearly the same frames.
+Without acceleration, τ(t) = τ(t − 0.1 s) − 0.1 s; the remaining difference is the noise of two labels, less
+what they share: they come from nearly the same frames.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ STEP_S: Final = 1 / FRAME_RATE_HZ
 
 @dataclass(frozen=True, slots=True)
 class LabelNoise:
-    """The noise of the labels in a TTC range, or `overall`: MiD ×10⁻⁴, None without a pair.
+    """The noise of labels in a TTC range, or `overall`: MiD ×10⁻⁴, None without a pair.
 
-    `jitter` is the mean difference between a label and the one that its predecessor lets expect; `noise` is
-    the mean error of a label that explains it.
+    `jitter` is the mean difference between a label and its prediction from the one before, `noise` the mean
+    error of a label that explains it.
     """
 
     name: str
@@ -40,10 +40,7 @@ class LabelNoise:
 
 
 def successive(table: Table) -> tuple[Floats, Floats]:
-    """The times to contact (n,), (n,) of the labels of a vehicle that are 0.1 s apart, earlier and later.
-
-    Raises `Rejected` where there are none.
-    """
+    """Pair each vehicle's labels 0.1 s apart, earlier and later seconds (n,); raises `Rejected` if none."""
     track_of = {
         key: number
         for number, key in enumerate(
@@ -65,7 +62,7 @@ def successive(table: Table) -> tuple[Floats, Floats]:
 
 
 def successive_in_sequences(frame_ttc_s: Sequence[Sequence[float]]) -> tuple[Floats, Floats]:
-    """The same of sequences (m, 6) of labels, NaN for frames without one. Raises `Rejected`."""
+    """Pair successive labels of sequences (m, 6), NaN if absent; raises `Rejected` if none."""
     frames = np.array(frame_ttc_s, dtype=np.float64)
     earlier, later = frames[:, :-1].ravel(), frames[:, 1:].ravel()
     there = np.isfinite(earlier) & np.isfinite(later)
@@ -76,10 +73,8 @@ def successive_in_sequences(frame_ttc_s: Sequence[Sequence[float]]) -> tuple[Flo
 
 
 def label_noise(earlier_s: Floats, later_s: Floats, *, n_frames: int = 10) -> list[LabelNoise]:
-    """The noise of labels whose velocities come from `n_frames` frames, overall and in each TTC range.
-
-    Pairs of which one time to contact has no MiD, close to contact, do not count.
-    """
+    """Compute the noise of labels whose velocities use `n_frames` frames, by TTC range."""
+    # Pairs close to contact, without a MiD, do not count.
     jitter = MID.errors(earlier_s - STEP_S, later_s)
     is_defined = np.isfinite(jitter)
     jitter, later_s = jitter[is_defined], later_s[is_defined]
@@ -94,10 +89,10 @@ def label_noise(earlier_s: Floats, later_s: Floats, *, n_frames: int = 10) -> li
 
 
 def jitter_of_noise(n_frames: int) -> float:
-    """The jitter for a noise of 1: √(2 (1 − ρ)), ρ the correlation of successive labels.
+    """Compute the jitter for a noise of 1: √(2 (1 − ρ)), ρ the correlation of successive labels.
 
-    Both are slopes of a least-squares line through q frames with independent errors, and share q − 1 of them:
-    with weights a_k = k − (q−1)/2, ρ = Σ a_k a_(k+1) / Σ a_k². One frame: labels without a common cause.
+    Slopes of least-squares lines through q frames, with weights a_k = k − (q−1)/2, have
+    ρ = Σ a_k a_(k+1) / Σ a_k². One frame means independent labels.
 
     >>> [round(jitter_of_noise(q), 3) for q in (1, 3, 5, 10)]
     [1.414, 1.414, 1.095, 0.775]

@@ -42,11 +42,9 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class FrameTtc:
-    """The estimates for each of n observations: `ttc_s` is NaN without a velocity.
+    """Estimates of n observations: `ttc_s` = −`depth_m` / velocity in seconds, NaN without a velocity."""
 
-    `ttc_s` = −`depth_m` / velocity, of the window `q`, which had `n_frames`, of which `n_inliers` agree;
-    `choice` is a key of `REASONS`.
-    """
+    # From the window `q` with `n_frames` frames, of which `n_inliers` agree, by `choice`, a key of `REASONS`.
 
     depth_m: Floats
     ttc_s: Floats
@@ -58,11 +56,7 @@ class FrameTtc:
 
 @dataclass(frozen=True, eq=False)
 class Annotation:
-    """Ground truth with how each value came about.
-
-    `rows` (m, 6) are the observations of each sequence, in the table's order. `counts` says, in words, how
-    many of what were used and left out.
-    """
+    """Ground truth with the origin of each value: `rows` (m, 6) are each sequence's observations."""
 
     table: Table
     frames: FrameTtc
@@ -70,7 +64,7 @@ class Annotation:
     counts: Mapping[str, int]
 
     def text(self) -> str:
-        """A CSV file that `read_truth` reads, with the further columns q, frames, inliers and choice."""
+        """Write a CSV file for `read_truth`, with the further columns q, frames, inliers and choice."""
         frames, target = self.frames, self.rows[:, -1]
         further = zip(
             *(
@@ -87,12 +81,12 @@ class Annotation:
 def annotate(
     tracks: Tracks, *, cut: Cut = "toolkit", depth: Depth = "checked", inlier_m: float = INLIER_M
 ) -> Annotation:
-    """Make ground truth of tracks, as the paper's section 4.2 says where it does.
+    """Make ground truth from tracks (paper, 4.2); raises `Rejected` if no sequence remains.
 
-    Velocities come from all frames of a track; frames that are truncated or whose box is small then are left
-    out of sequences, which end and begin there. `cut` is the toolkit's, without overlap, or "overlapping":
-    every six successive frames. `depth` is that of `frame_ttc`. Raises `Rejected` where no sequence remains.
+    `cut` is the toolkit's (no overlap) or "overlapping" (every six successive frames); `depth` is that of
+    `frame_ttc`.
     """
+    # Velocities use all frames; truncated or small boxes then end a sequence.
     frames = frame_ttc(tracks, depth=depth, inlier_m=inlier_m)
     with np.errstate(invalid="ignore"):
         size_px = tracks.box_px[:, 2:] - tracks.box_px[:, :2]
@@ -128,7 +122,7 @@ def annotate(
 
 
 def _finite_and_defined(ttc_s: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which times to contact are finite, and which have a defined error: a ground truth needs both."""
+    # A ground truth needs both.
     alpha = scale_ratio_10hz(ttc_s)
     with np.errstate(invalid="ignore"):
         is_defined = (alpha > 0) & np.isfinite(alpha) & ((ttc_s > 0) | (ttc_s < -0.1))
@@ -152,14 +146,11 @@ def _table(tracks: Tracks, frames: FrameTtc, rows: Indices) -> Table:
 
 
 def frame_ttc(tracks: Tracks, *, depth: Depth = "checked", inlier_m: float = INLIER_M) -> FrameTtc:
-    """τ of every observation from the past 3, 5 and 10 frames, itself included, and the choice among them.
+    """Compute τ = −y / ẏ of every observation from its past 3, 5 and 10 frames, and choose among them.
 
-    τ = −y / ẏ, with y of the nearest corner (Eq. 2) and ẏ its velocity: least squares over 3 frames, a
-    consensus over 5 and 10. A window that reaches beyond the beginning of a track has fewer frames.
-
-    The paper's y is the "measured" one, whole jumps included. With the depth "consensus", a frame that
-    disagrees with the others has the depth of their line: better where boxes jump, worse where a vehicle
-    accelerates. "checked" takes the line's only of frames that have jumped, by `JUMP_M`.
+    y is the nearest corner's (Eq. 2), ẏ by least squares over 3 frames, by consensus over 5 and 10. The depth
+    "measured" is the paper's; "consensus" replaces outliers by the line: better where boxes jump, worse under
+    acceleration; "checked" does so only for jumps over `JUMP_M`.
     """
     depth_m = nearest_depth_m(tracks.centre_m, tracks.size_m, tracks.yaw_rad)
     index, is_there = past_frames(tracks, n_frames=WINDOWS[-1])
@@ -171,7 +162,6 @@ def frame_ttc(tracks: Tracks, *, depth: Depth = "checked", inlier_m: float = INL
     step_m = depth_m - depth_m[index[-2]]
 
     def on_line(velocity: Velocities) -> NDArray[np.bool_]:
-        """Which frames have the depth of their line, where it is another one than the measured."""
         if depth != "checked":
             return np.full(depth_m.shape, depth == "consensus")
         return np.asarray(is_after_frame & (np.abs(step_m + velocity.mps * time_s[-2]) > JUMP_M))
@@ -202,12 +192,12 @@ def _velocities(
 
 
 def _is_recent(time_s: Floats) -> NDArray[np.bool_]:
-    """Which of the frames (q, n) lie in q frames at 10 Hz."""
+    """Find the frames (q, n) within q frames at 10 Hz."""
     return np.asarray(-time_s < (len(time_s) - 0.5) / FRAME_RATE_HZ)
 
 
 def past_frames(tracks: Tracks, *, n_frames: int) -> tuple[Indices, NDArray[np.bool_]]:
-    """Rows (q, n) of the past frames of each observation's track, its own last, and which are there."""
+    """Return rows (q, n) of each observation's past frames, itself last, and which exist."""
     n = tracks.n_observations
     names = {key: number for number, key in enumerate(dict.fromkeys(tracks.key))}
     track = np.array([names[key] for key in tracks.key])
@@ -224,7 +214,6 @@ def past_frames(tracks: Tracks, *, n_frames: int) -> tuple[Indices, NDArray[np.b
 
 
 def _sequences(tracks: Tracks, usable: Indices, cut: Cut) -> Iterator[list[int]]:
-    """The observations of each sequence, by recording and camera, then as the toolkit orders them."""
     cameras: dict[tuple[str, str], Camera] = {}
     for row in usable.tolist():
         key, ts_ns = tracks.key[row], int(tracks.ts_ns[row])
@@ -237,7 +226,6 @@ def _sequences(tracks: Tracks, usable: Indices, cut: Cut) -> Iterator[list[int]]
 
 
 def _overlapping(camera: Camera) -> Iterator[list[Attributes]]:
-    """Every six successive frames of a vehicle, by the last of them."""
     open_tracks: dict[Key, list[Attributes]] = {}
     for stamp in sorted(camera):
         for seen in camera[stamp]:

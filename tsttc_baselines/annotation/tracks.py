@@ -1,10 +1,10 @@
-"""Tracks of 3D boxes: a table `track.csv`, and what both kinds of input have to be like.
+"""Tracks of 3D boxes: the table `track.csv`, and the checks of both kinds of input.
 
     bag_stamp,cam_id,track_id,ts,x,y,z,length,width,height,yaw,box_x1,box_y1,box_x2,box_y2,truncated
 
-and, where there is a radar, `radar_velocity`. Metres in the coordinates of the vehicle, x to the right, y
-forward, z up; yaw in radians about z; boxes in pixels; ts in ns; velocities in m/s, negative for an object
-that approaches. More columns are ignored.
+and, with a radar, `radar_velocity`. Metres in vehicle coordinates (x right, y forward, z up); yaw in radians
+about z; boxes in pixels; ts in ns; velocities in m/s, negative for approaching objects. Other columns are
+ignored.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ Key = tuple[str, str, str]
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """n observations of vehicles; those of a track stand in the order of time, other tracks may lie between.
+    """n observations of vehicles, those of each track in order of time.
 
-    `centre_m` and `size_m` (length, width, height) are (n, 3), `box_px` (n, 4), NaN where the camera has no
-    box; `radar_mps` is NaN where the radar has no velocity, and `has_radar` says that there is a radar.
+    `centre_m` and `size_m` (length, width, height) are (n, 3), `box_px` (n, 4), NaN without a box;
+    `radar_mps` is NaN without a velocity.
     """
 
     key: tuple[Key, ...]
@@ -57,14 +57,11 @@ class Tracks:
 
     @property
     def n_observations(self) -> int:
-        """The number of rows."""
         return len(self.key)
 
 
 @dataclass
 class Collected:
-    """Rows as they are read, checked one by one; `body` holds the numbers of `BODY`."""
-
     findings: Findings = field(default_factory=Findings)
     key: list[Key] = field(default_factory=list)
     ts_ns: list[int] = field(default_factory=list)
@@ -85,7 +82,6 @@ class Collected:
         radar_mps: float,
         where: str,
     ) -> None:
-        """Take one row; what is wrong with it is noted under `where`."""
         self._check_numbers(body, box_px, radar_mps, where)
         self._check_time(key, ts_ns, where)
         self.key.append(key)
@@ -135,7 +131,7 @@ class Collected:
         self._last[key] = (ts_ns, where)
 
     def tracks(self, *, has_radar: bool) -> Tracks:
-        """All rows; raises `Rejected` where anything was noted, and where there are none."""
+        """Return all rows; raises `Rejected` for noted faults and for no rows."""
         self.findings.raise_if_any()
         if not self.key:
             raise reject("empty", "There are no tracked vehicles; expected at least one.")
@@ -154,11 +150,7 @@ class Collected:
 
 
 def read_tracks(path: Path) -> Tracks:
-    """Read `track.csv`.
-
-    Raises `Rejected`, by line, for an unreadable table, missing columns, numbers that are absent or NaN,
-    two rows of a track for a frame, and rows of a track that are not in the order of time.
-    """
+    """Read `track.csv`; raises `Rejected`, by line, for malformed, duplicate or unordered rows."""
     rows = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
     try:
         return _read_rows(rows, next(rows, []))
@@ -224,5 +216,4 @@ def _number(name: str, text: str, findings: Findings, where: str) -> float:
 
 
 def _number_or_gap(name: str, text: str, findings: Findings, where: str) -> float:
-    """NaN for an empty field; "nan" as other programs write it is one too."""
     return _number(name, text, findings, where) if text else math.nan

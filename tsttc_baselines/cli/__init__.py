@@ -1,7 +1,4 @@
-"""The group `tsttc baseline`: one module per subcommand, imported when it is used.
-
-To add a subcommand, add one line to `COMMANDS`.
-"""
+"""The group `tsttc baseline`: one module per subcommand, imported on use. `COMMANDS` lists them."""
 
 from __future__ import annotations
 
@@ -49,7 +46,6 @@ def baseline() -> None:
 
 
 def require_opencv() -> None:
-    """Raise `Failure` where OpenCV is not installed; commands that read or draw images call it first."""
     if find_spec("cv2") is None:
         message = "The baselines need OpenCV; install it with: pip install '.[baselines]' in a checkout."
         raise Failure(message, exit_code=Exit.USAGE, code="no-opencv")

@@ -100,7 +100,6 @@ def _document(
 
 
 def _in_words(ablation: Ablation, rows: list[AblationRow], *, n_sequences: int) -> list[str]:
-    """The table with one line for each setting, and what it says and leaves open."""
     heads = [ablation.title.lower(), "MiD paper", "MiD here", "RTE paper", "RTE here", "fallbacks"]
     lines = [[Cell(text, is_bold=True) for text in heads]]
     for row in rows:

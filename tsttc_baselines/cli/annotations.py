@@ -116,7 +116,6 @@ def _box_table(tracks: Tracks, annotation: Annotation) -> str:
 
 
 def _in_words(annotation: Annotation, output: Path, *, has_radar: bool) -> Iterator[str]:
-    """Lines on the sequences made and left out, the reasons, and the choice of velocities."""
     counts = annotation.counts
     recordings = len(set(annotation.table.bag_stamp))
     yield f"{output}: {_n(counts['sequences'], 'sequence')} of {_n(recordings, 'recording')}."

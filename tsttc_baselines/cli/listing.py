@@ -34,7 +34,6 @@ def list_methods(*, as_json: bool) -> None:
 
 
 def parameter_in_words(parameter: Parameter) -> str:
-    """Its values, its default and what it is for."""
     values = "|".join(parameter.choices) or parameter.kind.__name__.upper()
     default = "" if parameter.default is None else f" (default {parameter.default_in_words})"
     return f"{values}{default}: {parameter.help}"

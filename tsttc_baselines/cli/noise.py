@@ -66,7 +66,6 @@ def _pairs(source: Path) -> tuple[Floats, Floats]:
 
 
 def _in_words(noises: Sequence[LabelNoise], n_frames: int) -> Iterator[str]:
-    """The table, its units, and what it takes for granted."""
     ranges = known_ranges()
     rows = [[Cell(text, is_bold=True) for text in ("TTC range", "pairs", "jitter", "noise")]]
     for each in noises:

@@ -19,7 +19,6 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 def gap_option(command: Command) -> Command:
-    """--gap: which frame is the reference."""
     return default_option(
         "--gap",
         "frame_gap",
@@ -30,7 +29,6 @@ def gap_option(command: Command) -> Command:
 
 
 def jobs_option(command: Command) -> Command:
-    """--jobs: how many processes."""
     return click.option(
         "--jobs",
         "n_processes",
@@ -41,22 +39,19 @@ def jobs_option(command: Command) -> Command:
 
 
 def out_option(what: str, *, name: str = "--out", metavar: str = "FILE") -> Callable[[Command], Command]:
-    """-o and --out, or another long name: the file that the command writes."""
     kind = click.Path(dir_okay=False, path_type=Path)
     return click.option("-o", name, required=True, type=kind, metavar=metavar, help=what)
 
 
 def truth_option(what: str) -> Callable[[Command], Command]:
-    """--truth: the ground truth, by default that of the folder."""
     return click.option("--truth", "truth_path", type=TABLE, metavar="FILE", help=what)
 
 
 def require_writable(out: Path) -> None:
-    """Say before the work, not after it, that its result has no place."""
+    # Before the work, not after it.
     if not os.access(out.parent, os.W_OK):
         raise click.BadParameter(f"{out.parent} is not a folder that can be written to.", param_hint="--out")
 
 
 def n_cores() -> int:
-    """The processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -15,7 +15,7 @@ EVERY_S: Final = 5.0
 
 @contextmanager
 def shown_progress(title: str, *, total: int) -> Iterator[Callable[[int], None]]:
-    """Yield a function to call at least every second with the number of `total` sequences that are done."""
+    """Yield a function to call at least every second with the number of finished sequences."""
     if not sys.stderr.isatty():
         yield _Lines(total).show
         return
@@ -32,8 +32,6 @@ def shown_progress(title: str, *, total: int) -> Iterator[Callable[[int], None]]
     from rich.text import Text  # noqa: PLC0415 -- as above
 
     class Rate(ProgressColumn):
-        """Sequences per second."""
-
         def render(self, task: Task) -> Text:
             return Text(f"{task.finished_speed or task.speed or 0:,.0f}/s")
 
@@ -56,7 +54,7 @@ def shown_progress(title: str, *, total: int) -> Iterator[Callable[[int], None]]
 
 
 class _Lines:
-    """A line on standard error when so much time has gone by; a short run shows none."""
+    """Progress as lines on standard error, none in a short run."""
 
     def __init__(self, total: int) -> None:
         self._total = total

@@ -25,7 +25,7 @@ Command = Callable[..., Any]
 
 
 def _method_options(command: Command) -> Command:
-    """An option for each parameter of a method; methods share those of one name."""
+    # Methods share an option of one name.
     shared: dict[str, dict[str, Parameter]] = {}
     for method in METHODS:
         for parameter in method.parameters:
@@ -36,7 +36,6 @@ def _method_options(command: Command) -> Command:
 
 
 def _option(of_method: Mapping[str, Parameter]) -> Callable[[Command], Command]:
-    """The option of a name, with the parameters of that name by method."""
     parameter = next(iter(of_method.values()))
     defaults = [
         f"{method} {other.default_in_words}"
@@ -140,7 +139,6 @@ def run(
 
 
 def _given(method: Method, options: Mapping[str, Value]) -> dict[str, Value]:
-    """The options that were given; raises for one that the method does not have."""
     given: dict[str, Value] = {name: value for name, value in options.items() if value is not None}
     known = {parameter.name: parameter.option for parameter in method.parameters}
     for name in given:
@@ -152,7 +150,7 @@ def _given(method: Method, options: Mapping[str, Value]) -> dict[str, Value]:
 
 
 def _require_estimator(method: Method, given: Mapping[str, Value]) -> None:
-    """Say before the folder is read that the method cannot be made with these options."""
+    # Before the folder is read.
     try:
         filled = method.filled(given)
         weights = filled.get("weights")

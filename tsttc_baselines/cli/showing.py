@@ -54,7 +54,6 @@ def show(
 
 
 def _true_ttc_s(path: Path, anno_id: int) -> float | None:
-    """The true value of the sequence; None where the file is absent or has no such sequence."""
     from evaluator import read_truth  # noqa: PLC0415 -- numpy, which --help can do without
 
     if not path.exists():

@@ -23,7 +23,6 @@ _SOURCES = ("val", "test", "scripts")
 
 
 def _split_options(command: Command) -> Command:
-    """The options that say which split is drawn."""
     options = (
         default_option(
             "--like",

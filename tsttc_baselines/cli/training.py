@@ -170,10 +170,7 @@ def _start(path: Path) -> Weights:
 
 
 def _use(recipe: dict[str, Any], *, start: Weights | None) -> Use:
-    """How the weights are used, as the start's card says; takes its options from `recipe`.
-
-    Raises `UsageError` for options that contradict the card.
-    """
+    """Take the card's settings of a start, or the options in `recipe`; raises `UsageError` for conflicts."""
     from tsttc_baselines.deep_scale.weights import Use  # noqa: PLC0415 -- as above
 
     use = Use(similarity="cosine") if start is None else start.use
@@ -208,7 +205,6 @@ def _rendered(n_sequences: int, *, seed: int) -> Source:
 
 
 def _folder_source(path: Path) -> Source:
-    """The sequences of a folder that has its ground truth; raises `Failure` for one that has not."""
     from evaluator import read_truth  # noqa: PLC0415 -- as above
     from tsttc_baselines.deep_scale.samples import FolderSequences  # noqa: PLC0415 -- --help can do without
     from tsttc_baselines.folders import read_folder  # noqa: PLC0415 -- as above

@@ -1,9 +1,7 @@
-"""The toolkit's checkpoint, a zip of a pickle and raw tensors, read without torch and without running it.
+"""The toolkit's checkpoint, a zip of a pickle and raw tensors, read without torch or running it."""
 
-The pickle may name four things: an ordered dict, torch's function that puts a tensor together, and two kinds
-of storage. Each is answered here by an object that only takes notes. Sizes are compared with limits before
-anything is read, and tensors with what the network needs before their bytes are.
-"""
+# The pickle may name an ordered dict, torch's function that rebuilds a tensor, and two kinds of storage;
+# stand-ins only take notes. Sizes are checked before anything is read, and tensors before their bytes are.
 
 from __future__ import annotations
 
@@ -31,7 +29,7 @@ Shape = tuple[int, ...]
 
 
 def read_entry(archive: zipfile.ZipFile, name: str, *, n_bytes: int) -> bytes:
-    """The `n_bytes` of an entry, which has to have just as many; raises `Rejected`."""
+    """Read an entry of exactly `n_bytes`; raises `Rejected`."""
     try:
         with archive.open(name) as file:
             data = file.read(n_bytes + 1)
@@ -45,7 +43,7 @@ def read_entry(archive: zipfile.ZipFile, name: str, *, n_bytes: int) -> bytes:
 
 
 def open_archive(data: bytes) -> zipfile.ZipFile:
-    """The zip in `data`, none of it unpacked; raises `Rejected` for another file and for a zip too large."""
+    """Open a zip in `data` without unpacking; raises `Rejected` for other or too large files."""
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except (zipfile.BadZipFile, ValueError, OverflowError, EOFError, NotImplementedError):
@@ -65,10 +63,8 @@ def open_archive(data: bytes) -> zipfile.ZipFile:
 def read_checkpoint(
     archive: zipfile.ZipFile, *, expected: Mapping[str, Shape]
 ) -> dict[str, NDArray[np.float32]]:
-    """The tensors under "model", just those of `expected` with these shapes.
-
-    Counters of batches, which nothing uses, may be there too. Raises `Rejected` with all that is wrong.
-    """
+    """Read the tensors under "model", exactly the `expected` ones; raises `Rejected` with every fault."""
+    # Counters of batches are accepted and unused.
     [pickled] = [name for name in archive.namelist() if name.endswith("/data.pkl")] or [""]
     if not pickled:
         raise reject("bad-weights", "The zip has no data.pkl; expected a checkpoint of torch 1.6 or later.")
@@ -104,7 +100,6 @@ def _unpickled(archive: zipfile.ZipFile, name: str) -> object:
 
 
 def _model(checkpoint: object) -> dict[str, _Tensor]:
-    """The noted tensors by their names."""
     model = checkpoint.get("model") if isinstance(checkpoint, dict) else None
     if not isinstance(model, dict) or not all(
         isinstance(name, str) and isinstance(tensor, _Tensor) for name, tensor in model.items()
@@ -123,7 +118,7 @@ class _Storage:
 
 @dataclass(frozen=True, slots=True)
 class _Tensor:
-    """The pickle's entry for a tensor, untrusted until `fault` has checked it."""
+    """An untrusted tensor of the pickle until `fault` has checked it."""
 
     storage: Any
     offset: Any
@@ -131,7 +126,7 @@ class _Tensor:
     stride: Any
 
     def fault(self, expected: Shape) -> str | None:
-        """The fault, to follow its name; None if it has this shape and is contiguous."""
+        """Explain why it lacks this shape or is not contiguous, else None."""
         if self.shape != expected:
             return f"has the shape {self.shape}; expected {expected}"
         if not isinstance(self.storage, _Storage) or self.storage.kind != "FloatStorage":
@@ -143,7 +138,7 @@ class _Tensor:
         return None
 
     def values(self, archive: zipfile.ZipFile, *, root: str) -> NDArray[np.float32]:
-        """Its numbers, which have to be finite; call `fault` first."""
+        """Return its numbers, all finite; call `fault` first."""
         name = f"{root}data/{self.storage.key}"
         if name not in archive.NameToInfo:
             raise reject("bad-weights", f"The zip has no entry {quoted(name)}, which a tensor refers to.")
@@ -153,14 +148,12 @@ class _Tensor:
 
 
 class _Notes(dict[Any, Any]):
-    """An ordered dict; attributes that a pickle gives it are left out."""
-
     def __setstate__(self, state: object) -> None:
         pass
 
 
 class _Answer:
-    """The stand-in for a name of the pickle; it is made for one reading and has no mutable state."""
+    """A stand-in for a name of the pickle, without mutable state."""
 
     __slots__ = ("name",)
 

@@ -1,8 +1,7 @@
-"""The network's input for a pair: a crop of each frame about its box, with float boxes in its pixels.
+"""The network's input: a crop of each frame about its box, with float boxes in its pixels."""
 
-The toolkit pads all crops to 300 × 300 pixels. These are as large as the network looks, which is several
-times faster. Outside of the frame its border is repeated, so that no sequence is dropped and no centre moves.
-"""
+# The toolkit pads all crops to 300 × 300 pixels; these are only as large as the network looks, and faster.
+# The frame's border repeats outside, so that no sequence is dropped and no centre moves.
 
 from __future__ import annotations
 
@@ -27,7 +26,7 @@ from tsttc_baselines.patches import cut
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Crop:
-    """`pixels` is float32 (h, w, 3), blue first, h and w even; `box` (4,) is in pixels of the crop."""
+    """A crop: `pixels` float32 (h, w, 3), blue first, h and w even; `box` (4,) in its pixels."""
 
     pixels: NDArray[np.float32]
     box: Floats
@@ -35,9 +34,7 @@ class Crop:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CropPair:
-    """The crops of a pair. The reference's box has the target's size, about the reference box's centre: the
-    network multiplies it by each scale ratio.
-    """
+    """Two crops; the reference's box has the target's size, to be multiplied by each scale ratio."""
 
     reference: Crop
     target: Crop
@@ -53,11 +50,10 @@ def cut_pair(
     margin_px: float,
     n_cells: int,
 ) -> CropPair:
-    """Crops of two frames in colour for scale ratios up to `max_scale`.
+    """Cut crops of two colour frames for scale ratios up to `max_scale`; `boxes` of both.
 
-    `boxes` are those of reference and target. Both frames are shrunk by the same ratio where the longer side
-    of the target's expanded box is over `max_box_px`. The crops have `margin_px` more on each side than is
-    compared in `n_cells` cells: features near the edge of a crop have seen zeros.
+    Frames are shrunk by one ratio if the target's expanded box is over `max_box_px`. `margin_px` surrounds
+    the `n_cells` compared cells: features near a crop's edge have seen zeros.
     """
     height, width = target.shape[:2]
     ratio = shared_expansion(*boxes, width_px=width, height_px=height, at_most=MAX_EXPANSION)

@@ -35,13 +35,12 @@ _FRAME_GAP: Final = 5
 
 
 class DeepScale:
-    """The baseline with the weights that come with the package, or with those of a file.
+    """The baseline with the package's weights, or those of a file.
 
-    `device` is "numpy", or where torch is to compute: "cpu" or "cuda". `decoding` is how the scale ratio
-    comes about: "head" is the paper's mean over the four surest of 20, "fit" lays the features of the
-    reference on those of the target from there (`fit`), and "auto" is what the weights' card says; the
-    toolkit's have the head. Raises `Rejected` for weights that are
-    at fault, `OSError`, and `ValueError` for a device that is not there.
+    `device` is "numpy", or "cpu" or "cuda" by torch. `decoding` makes the scale ratio: "head" is the paper's
+    mean of the four best of 20, "fit" refines it by matching features (`fit`), "auto" is the card's; the
+    toolkit's weights have the head. Raises `Rejected` for faulty weights, `OSError`, and `ValueError` for a
+    missing device.
     """
 
     def __init__(
@@ -57,7 +56,7 @@ class DeepScale:
         self._operations = operations_on(device, loaded)
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
-        """Raises `Unusable` where a box is missing, too small, or has its centre outside of the image."""
+        """Estimate α; raises `Unusable` for a box that is missing, too small or centred outside the image."""
         frames, boxes = _usable(clip, frame_gap=frame_gap)
         confidences = self.confidences(cut(frames, boxes, use=self._use))
         best = best_of(-confidences, n_top=N_TOP)
@@ -67,17 +66,15 @@ class DeepScale:
         return Estimate(scale_ratio, confidence=float(confidences[best[0]]))
 
     def crops(self, clip: Clip, *, frame_gap: int) -> CropPair:
-        """The network's input; raises as a call does."""
         return cut(*_usable(clip, frame_gap=frame_gap), use=self._use)
 
     def confidences(self, pair: CropPair) -> Floats:
-        """(20,): how sure the network is of each scale ratio, between 0 and 1."""
+        """Return the confidence of each scale ratio, (20,), 0 to 1."""
         logits = self._operations.values(network_logits(self._operations, [pair], use=self._use))[0]
         return np.asarray(0.5 + 0.5 * np.tanh(0.5 * logits.astype(np.float64)))
 
 
 def _usable(clip: Clip, *, frame_gap: int) -> tuple[tuple[Image, Image], tuple[Floats, Floats]]:
-    """Frames in colour and boxes of reference and target; raises as a call does."""
     boxes = boxes_of_pair(clip, frame_gap=frame_gap)
     frames = clip.colour(TARGET - frame_gap), clip.colour(TARGET)
     for image, box, name in zip(frames, boxes, ("reference", "target"), strict=True):
@@ -86,12 +83,10 @@ def _usable(clip: Clip, *, frame_gap: int) -> tuple[tuple[Image, Image], tuple[F
 
 
 def network_scales() -> Floats:
-    """(20,): the scale ratios of the network's outputs."""
     return scale_bins(frame_gap=_FRAME_GAP, n_bins=N_SCALES)
 
 
 def cut(frames: tuple[Image, Image], boxes: tuple[Floats, Floats], *, use: Use) -> CropPair:
-    """The crops of reference and target (colour) as these weights want them."""
     return cut_pair(
         *frames,
         boxes,
@@ -103,7 +98,7 @@ def cut(frames: tuple[Image, Image], boxes: tuple[Floats, Floats], *, use: Use) 
 
 
 def network_logits(operations: Operations, pairs: Sequence[CropPair], *, use: Use) -> Array:
-    """(b, 20): the network's outputs for a batch, before the sigmoid, as an array of the operations."""
+    """Compute the network's outputs (b, 20) before the sigmoid, as an array of the operations."""
     target, reference = (
         features(operations, operations.constant(stacked(crops)))
         for crops in ([pair.target for pair in pairs], [pair.reference for pair in pairs])
@@ -124,7 +119,7 @@ def network_logits(operations: Operations, pairs: Sequence[CropPair], *, use: Us
 
 
 def stacked(crops: Sequence[Crop]) -> Pixels:
-    """(b, 3, h, w): the crops, with the right and lower border repeated where one is smaller."""
+    """Stack crops (b, 3, h, w), with borders repeated on smaller ones."""
     height, width = (max(crop.pixels.shape[axis] for crop in crops) for axis in (0, 1))
     wide = [
         np.pad(
@@ -138,7 +133,7 @@ def stacked(crops: Sequence[Crop]) -> Pixels:
 
 
 def operations_on(device: Device, weights: Weights) -> Operations:
-    """The network's operations with these weights; raises `ValueError` for a device that is not there."""
+    """Make the network's operations; raises `ValueError` for a missing device."""
     if device == "numpy":
         return NumpyLayers(weights.tensors)
     if find_spec("torch") is None:

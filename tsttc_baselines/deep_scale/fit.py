@@ -1,22 +1,18 @@
-"""The estimate from a fit: the reference frame is cut again until its features match those of the target.
+"""The estimate from a fit: the reference frame is cut again until its features match the target's.
 
-The network's head knows 20 scale ratios, 4.5 % apart, and shifts by whole cells. Here scale ratio and shift
-are continuous. The target's box is cut with a margin; the reference frame is cut on the same grid, about a
-place and enlarged by a scale ratio that are to be found. Where both are right, the two crops show the same,
-pixel by pixel, and so do their features F. From features that differ, one step of Gauss-Newton says how much
-is lacking:
+The head knows 20 scale ratios, 4.5 % apart, and whole cells; here scale ratio and shift are continuous. The
+target's box and the reference, moved and scaled by the present estimate, are cut on one grid. Their features
+F give a Gauss-Newton step
 
     F_target(u) − F_reference(u)  ≈  (δ · u + s) · ∇F(u)
 
-with u the position from the middle of the box, and F in the gradient the mean of both (Malis, "Improving
-vision-based control using efficient second-order minimization techniques", 2004). Then the reference frame is
-cut again, at α · exp(δ) and shifted by s, and its features are computed anew. So the error of a network that
-halves its input, and whose features depend on where its pixels lie, is the same in both crops, and drops out.
-
-The equations of all pixels are solved by weighted least squares: features are weighted by the inverse
-covariance of their errors in this pair, and pixels by how well the step before explains them, so that the
-surroundings, lights that switch on, and parts at other depths count for less.
+with u the position from the middle of the box and F in the gradient the mean of both (Malis, "Improving
+vision-based control using efficient second-order minimization techniques", 2004). The reference is then cut
+at α · exp(δ), shifted by s. Weighted least squares: features by the inverse covariance of their errors,
+pixels by the step before, so that surroundings, lights and parts at other depths count less.
 """
+
+# Both crops are computed alike, so an error that depends on where the pixels lie cancels.
 
 from __future__ import annotations
 
@@ -75,7 +71,7 @@ _NORMAL_RIDGE: Final = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The part of a frame that a grid shows: `scale_ratio` times its size, about `centre` (2,), in pixels."""
+    """The part of a frame on a grid: `scale_ratio` times its size, about `centre` (2,), in pixels."""
 
     scale_ratio: float
     centre: Floats
@@ -83,11 +79,9 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """An even grid over the target's box and a margin.
+    """An even grid over the target's box and a margin; `pixel_size` is in target pixels."""
 
-    `shape` is (rows, columns), both even; `rows` and `columns` are those over the box; `pixel_size` is in
-    pixels of the target frame.
-    """
+    # `shape` is (rows, columns), both even; `rows` and `columns` are those over the box.
 
     shape: tuple[int, int]
     rows: slice
@@ -96,7 +90,8 @@ class Grid:
 
     @classmethod
     def over(cls, box: Floats, *, box_px: float) -> Grid:
-        """For a box (4,) whose longer side gets `box_px`, or less: frames are enlarged at most twice."""
+        """Make the grid for a box (4,) with a longer side of `box_px` or less."""
+        # Frames are enlarged at most twice.
         size = _EXPANSION * size_of(box)
         longer = float(np.max(size))
         pixel_size = longer / min(box_px, _MAX_ENLARGEMENT * longer)
@@ -110,7 +105,7 @@ class Grid:
         )
 
     def cut(self, frame: Image, view: View) -> Pixels:
-        """(3, rows, columns): a view of the frame (in colour) on this grid; the frame's border repeats."""
+        """Cut a view of a colour frame on this grid, (3, rows, columns); the border repeats."""
         step = self.pixel_size * view.scale_ratio
         blur = _BLUR * max(self.pixel_size, 1.0) * view.scale_ratio
         down, across = (
@@ -123,17 +118,17 @@ class Grid:
         return np.asarray(down.weights @ pixels @ across.weights.T)
 
     def offsets(self) -> tuple[Floats, Floats]:
-        """The offsets of the rows and the columns from the middle of the box, in pixels of the grid."""
+        """The rows' and columns' offsets from the middle of the box, in grid pixels."""
         rows, columns = (np.arange(length, dtype=np.float64) - (length - 1) / 2 for length in self.shape)
         return rows, columns
 
     @property
     def reach(self) -> float:
-        """From the middle of the box to its farther edge, in pixels of the grid."""
+        """The distance from the middle of the box to its farther edge, in grid pixels."""
         return 0.5 * float(max(part.stop - part.start for part in (self.rows, self.columns)))
 
     def moved(self, view: View, step: Floats) -> View:
-        """The view after a step (3,): growth of ln α, and the shift in x and y in pixels of the grid."""
+        """Move a view by a step (3,): growth of ln α, shifts in x and y in grid pixels."""
         limits = _MAX_STEP * np.array([1.0, self.reach, self.reach])
         growth, *shift = np.clip(step, -limits, limits)
         centre = view.centre + view.scale_ratio * self.pixel_size * np.array(shift)
@@ -142,7 +137,7 @@ class Grid:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """A view, and how far from 0 the differences of the features were before the last step, squared."""
+    """A view, and the squared feature differences before the last step."""
 
     view: View
     unlike: float
@@ -155,11 +150,9 @@ def fitted_scale_ratio(
     *,
     near: float,
 ) -> float:
-    """α of a pair: reference and target (in colour), and their boxes (4,) in pixels; `near` is the head's.
-
-    The steps begin there and at the ratio of the boxes' sizes. On the coarse grid the start is chosen whose
-    features are more alike. Raises `Unusable` for boxes without a size.
-    """
+    """Estimate α of a pair of colour frames and boxes (4,) in pixels; `near` is the head's estimate."""
+    # Starts are `near` and the ratio of the boxes' sizes; the better one on the coarse grid continues. Boxes
+    # without a size are `Unusable`.
     starts = np.clip([near, scale_ratio_of_two(*boxes, measure="sqrt-area")], *_STARTS)
     views = [View(start, centre_of(boxes[0])) for start in starts.tolist()]
     for box_px in (COARSE_PX, FINE_PX):
@@ -169,7 +162,6 @@ def fitted_scale_ratio(
 
 
 def shown_at(operations: Operations, frames: tuple[Image, Image], box: Floats, view: View) -> View:
-    """The view of the reference frame to which the steps on the coarse grid lead from this one."""
     return _fits(operations, frames, box, [view], box_px=COARSE_PX)[0].view
 
 
@@ -181,7 +173,6 @@ def _fits(
     *,
     box_px: float,
 ) -> list[Fit]:
-    """Fit each view of the reference frame by steps on a grid over the target's box."""
     reference, target = frames
     grid = Grid.over(box, box_px=box_px)
     wanted = _features(operations, grid.cut(target, View(1.0, centre_of(box))))
@@ -207,7 +198,7 @@ def _features(operations: Operations, pixels: Pixels) -> Pixels:
 
 
 def evened(maps: Array) -> Array:
-    """The features (24, h, w) with about the same strength everywhere, less where there are hardly any."""
+    """Even out the strength of features (24, h, w), less where there are hardly any."""
     squares = (maps**2).sum(0)
     return maps / (squares + squares.mean() + LEAST_NORM) ** 0.5
 
@@ -215,11 +206,8 @@ def evened(maps: Array) -> Array:
 def equations(
     xp: Any, target: Array, reference: Array, *, grid: Grid, offsets: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """The equations of the box's pixels, with features (24, h, w) as `evened` gives them.
-
-    (3, 24, p): what growth of ln α and shifts in x and y change in the features, and (24, p): what the
-    reference's have too much. `xp` is numpy or torch; `offsets` are the grid's, as arrays of it.
-    """
+    """Return derivatives (3, 24, p) by ln α, x and y, and the reference's excess (24, p)."""
+    # For the box's pixels, from features (24, h, w) of `evened`; `xp` is numpy or torch.
     rows, columns = grid.rows, grid.columns
     mean = 0.5 * (target + reference)
     slope_x = (mean[:, rows, _shifted(columns, 1)] - mean[:, rows, _shifted(columns, -1)]) / 2
@@ -235,7 +223,7 @@ def _shifted(part: slice, by: int) -> slice:
 
 
 def weighting(xp: Any, design: Array, errors: Array) -> tuple[Array, Array]:
-    """The weights of the equations: (24, 24), by which features are multiplied, and (p,) of the pixels."""
+    """Compute the weights of features (24, 24) and of pixels (p,)."""
     weights = _weights(xp, errors)
     covariance = (errors * weights) @ errors.T / weights.sum()
     ones = xp.ones_like(covariance[0])
@@ -250,7 +238,7 @@ def weighting(xp: Any, design: Array, errors: Array) -> tuple[Array, Array]:
 
 
 def solution(xp: Any, design: Array, errors: Array, weights: Array) -> Array:
-    """(3,): the step that leaves the least of the errors, by weighted least squares."""
+    """Solve for the step (3,) by weighted least squares."""
     weighted = (design * weights).reshape(3, -1)
     design = design.reshape(3, -1)
     norms = ((weighted * design).sum(-1) + LEAST_NORM) ** 0.5
@@ -260,6 +248,6 @@ def solution(xp: Any, design: Array, errors: Array, weights: Array) -> Array:
 
 
 def _weights(xp: Any, errors: Array) -> Array:
-    """(p,): Geman and McClure's weights; a pixel with the error of most has a quarter."""
+    """Compute Geman and McClure's weights (p,); the median error gets a quarter."""
     squares = (errors**2).sum(0)
     return 1 / (1 + squares / (xp.median(squares) + LEAST_NORM)) ** 2

@@ -31,9 +31,7 @@ near, as in the last steps of a fit.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FitSample:
-    """`pixels` (2, 3, rows, columns) are those of target and reference on `grid`; `lacking` is what the
-    reference's ln α lacks.
-    """
+    """Pixels (2, 3, rows, columns) of target and reference; `lacking` is missing in the reference's ln α."""
 
     pixels: Pixels
     grid: Grid
@@ -48,11 +46,8 @@ def fit_sample(
     operations: Operations,
     rng: np.random.Generator,
 ) -> FitSample:
-    """The reference's crop where it shows the target's vehicle, but for a small error in ln α and place.
-
-    Frames in colour, boxes (4,), and the true scale ratio of a pair. The place is where the network, that is
-    `operations`, sees the vehicle: the boxes do not say it, since each errs for itself.
-    """
+    """Cut the reference where it shows the target's vehicle, with a small error in ln α and position."""
+    # The position is where the network sees the vehicle, because each box errs for itself.
     reference, target = frames
     reference_box, box = boxes
     there = shown_at(operations, frames, box, View(scale_ratio, centre_of(reference_box)))

@@ -1,8 +1,6 @@
-"""The operations of the network in numpy: convolutions as products of matrices, batch norms folded in.
+"""The network's operations in numpy: convolutions as matrix products, batch norms folded in."""
 
-Images are (b, channels, h, w) as everywhere, but lie in memory with the channels last, so that the patches of
-a row are one matrix.
-"""
+# Images are (b, channels, h, w), but channels come last in memory: the patches of a row are one matrix.
 
 from __future__ import annotations
 
@@ -30,13 +28,11 @@ _MAX_STRIP: Final = 2**20
 
 @dataclass(frozen=True, eq=False)
 class NumpyLayers:
-    """The operations with these tensors, by the names of the weights."""
-
     tensors: Mapping[str, Floats]
 
     @cached_property
     def _folded(self) -> dict[str, tuple[Floats, Floats]]:
-        """Of each block, the kernel (k, k · channels, channels out) and the bias, batch norm included."""
+        """Fold batch norm into each block's kernel (k, k · channels, channels out) and bias."""
         folded = {}
         for key, weight in self.tensors.items():
             name, is_conv, _ = key.partition(".conv.weight")
@@ -50,43 +46,34 @@ class NumpyLayers:
         return folded
 
     def block(self, name: str, images: Floats, *, stride: int = 1) -> Floats:
-        """As `network.Operations`."""
         kernel, bias = self._folded[name]
         outputs = [convolved(each, kernel, bias, stride=stride) for each in _channels_last(images)]
         return _channels_first(silu(np.stack(outputs)))
 
     def upsampled(self, name: str, images: Floats) -> Floats:
-        """As `network.Operations`."""
         kernel, bias = self.tensors[f"{name}.weight"], self.tensors[f"{name}.bias"]
         return _channels_first(doubled(_channels_last(images), kernel) + bias)
 
     def joined(self, one: Floats, other: Floats) -> Floats:
-        """As `network.Operations`."""
         return _channels_first(np.concatenate([_channels_last(one), _channels_last(other)], axis=-1))
 
     def constant(self, values: NDArray[Any]) -> Floats:
-        """As `network.Operations`."""
         return values.astype(np.float32)
 
     def permuted(self, values: Floats, axes: tuple[int, ...]) -> Floats:
-        """As `network.Operations`."""
         return values.transpose(axes)
 
     def unit(self, vectors: Floats, *, axis: int) -> Floats:
-        """As `network.Operations`."""
         squares = np.square(vectors).sum(axis=axis, keepdims=True)
         return np.asarray(vectors / np.sqrt(squares + np.float32(LEAST_NORM)))
 
     def greatest(self, values: Floats) -> Floats:
-        """As `network.Operations`."""
         return np.asarray(values.max(axis=-1))
 
     def linear(self, name: str, values: Floats) -> Floats:
-        """As `network.Operations`."""
         return np.asarray(values @ self.tensors[f"{name}.weight"].T + self.tensors[f"{name}.bias"])
 
     def values(self, array: Floats) -> Floats:
-        """As `network.Operations`."""
         return array
 
 
@@ -99,18 +86,16 @@ def _channels_first(images: Floats) -> Floats:
 
 
 def silu(values: Floats) -> Floats:
-    """x / (1 + exp(−x)), in place."""
+    """Compute x / (1 + exp(−x)) in place."""
     with np.errstate(over="ignore"):  # exp(−x) = ∞ gives the right 0
         values /= 1 + np.exp(-values)
     return values
 
 
 def convolved(image: Floats, kernel: Floats, bias: Floats, *, stride: int = 1) -> Floats:
-    """(h, w, channels out): the convolution of `image` (h, w, channels), with zeros around it.
-
-    `kernel` is (k, k · channels, channels out): for each of its rows, what lies side by side in an image. The
-    rows of the image are laid out once, as patches of 1 × k, and each row of the kernel multiplies them.
-    """
+    """Convolve `image` (h, w, channels) with zeros around it, to (h, w, channels out)."""
+    # `kernel` is (k, k · channels, channels out). The image's rows are laid out once as patches of 1 × k, and
+    # each row of the kernel multiplies them.
     size, channels = len(kernel), image.shape[2]
     if size == 1:
         return np.asarray(image @ kernel[0] + bias)
@@ -132,12 +117,8 @@ def convolved(image: Floats, kernel: Floats, bias: Floats, *, stride: int = 1) -
 
 
 def doubled(images: Floats, kernel: Floats) -> Floats:
-    """(b, 2h, 2w, channels out): the transposed convolution of `images` (b, h, w, channels) with stride 2,
-    padding 1 and output padding 1; `kernel` is (channels, channels out, 3, 3).
-
-    An even position of the output sees the middle of the kernel at one position of the input, an odd one the
-    two ends at two: those after the last are 0.
-    """
+    """Apply a transposed 3×3 convolution of stride 2: (b, h, w, channels) to (b, 2h, 2w, channels out)."""
+    # Padding 1, output padding 1. An even output position sees the kernel's middle, an odd one its two ends.
     b, height, width, _ = images.shape
     output = np.empty((b, 2 * height, 2 * width, kernel.shape[1]), dtype=np.float32)
     after = np.pad(images, ((0, 0), (0, 1), (0, 1), (0, 0)))

@@ -1,7 +1,5 @@
 """The network (§5.2): features of two crops, sampled for each scale ratio, and compared.
 
-It is written once, over the operations that `layers` has in numpy and `torch_layers` in torch:
-
     image (3, h, w), blue, green and red from 0 to 255
       stem     convolution 7×7, stride 2, to 12 channels
       stage 2  convolution 7×7 to 24 channels, and a CSP layer of three bottlenecks
@@ -9,10 +7,9 @@ It is written once, over the operations that `layers` has in numpy and `torch_la
       stage 3  two convolutions 7×7
     features (24, h, w)
 
-The target's features are sampled in 50×50 cells of its box, the paper's "target size". For each scale ratio
-α, the reference's are sampled in 52×52 cells of a box α times the target's size about the reference's centre,
-so that nine windows of 50×50 cells fit: shifts by up to one cell. The similarity of α is the greatest of the
-nine. A linear layer and a sigmoid turn the similarities into confidences.
+The target is sampled in 50×50 cells of its box; for each scale ratio α, the reference in 52×52 cells of a box
+α times the target's size about the reference's centre. The similarity of α is the greatest of nine shifts; a
+linear layer and a sigmoid make confidences. `layers` (numpy) and `torch_layers` have the operations.
 """
 
 from __future__ import annotations
@@ -41,47 +38,39 @@ Similarity = Literal["dot", "cosine"]
 
 
 class Operations(Protocol):
-    """The operations, by numpy or torch. Names are those of the weights; images are (b, c, h, w)."""
+    """The operations, by numpy or torch, named as the weights; images are (b, c, h, w)."""
 
     def block(self, name: str, images: Array, *, stride: int = 1) -> Array:
-        """Convolution, batch normalisation and SiLU. The size is kept, or halved and rounded up."""
+        """Convolve, normalise and apply SiLU; the size stays, or is halved and rounded up."""
         ...
 
     def upsampled(self, name: str, images: Array) -> Array:
-        """Transposed convolution 3×3, stride 2: twice the size."""
+        """Apply the transposed convolution 3×3, stride 2."""
         ...
 
-    def joined(self, one: Array, other: Array) -> Array:
-        """The channels of both."""
-        ...
+    def joined(self, one: Array, other: Array) -> Array: ...
 
-    def constant(self, values: NDArray[Any]) -> Array:
-        """These numbers as an array."""
-        ...
+    def constant(self, values: NDArray[Any]) -> Array: ...
 
-    def permuted(self, values: Array, axes: tuple[int, ...]) -> Array:
-        """The same with its axes in this order."""
-        ...
+    def permuted(self, values: Array, axes: tuple[int, ...]) -> Array: ...
 
     def unit(self, vectors: Array, *, axis: int) -> Array:
-        """The vectors along an axis divided by their norms; vectors of 0 stay."""
+        """Normalise vectors along an axis; zeros stay."""
         ...
 
     def greatest(self, values: Array) -> Array:
-        """The maximum along the last axis."""
+        """Take the maximum along the last axis."""
         ...
 
     def linear(self, name: str, values: Array) -> Array:
-        """The linear layer on the last axis."""
+        """Apply the linear layer to the last axis."""
         ...
 
-    def values(self, array: Array) -> NDArray[np.float32]:
-        """An array's numbers, for numpy."""
-        ...
+    def values(self, array: Array) -> NDArray[np.float32]: ...
 
 
 def features(operations: Operations, images: Array) -> Array:
-    """(b, 24, h, w): the features of `images` (b, 3, h, w); h and w are even."""
+    """Compute features (b, 24, h, w) of `images` (b, 3, h, w); h and w are even."""
     maps = operations.block("backbone.stem", images, stride=2)
     maps = operations.block("backbone.stage2.0", maps)
     deep = operations.block("backbone.stage2.1.conv1", maps)
@@ -96,12 +85,9 @@ def features(operations: Operations, images: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sampling:
-    """The sampling of one pair's features: matrices as `roi_align.sampling_matrix` makes them.
+    """Matrices of a pair from `roi_align.sampling_matrix`: target (3 · 52, h or w), reference (n, 52, …)."""
 
-    The target's are (3 · 52, h) and (3 · 52, w), for the three shifts one below the other: 50 cells with a
-    border of zeros, whose place is the shift. The reference's are (n, 52, h) and (n, 52, w), one for each
-    scale ratio.
-    """
+    # The target's are three shifts of 50 cells with a border of zeros; the reference's are by scale ratio.
 
     target_rows: Floats
     target_columns: Floats
@@ -119,10 +105,7 @@ class Sampling:
         target_shape: tuple[int, int],
         reference_shape: tuple[int, int],
     ) -> Sampling:
-        """For boxes (4,) in pixels of the two crops, whose shapes are (h, w).
-
-        Both boxes have the target's size; the reference's is multiplied by each of the `scales` (n,).
-        """
+        """Make the matrices for boxes (4,) of the target's size, in pixels of crops of shape (h, w)."""
         n_sampled = n_cells + 2 * MAX_SHIFT
         boxes = expand(reference_box, scales * (n_sampled / n_cells))
         rows, columns = (
@@ -145,7 +128,7 @@ class Sampling:
 
 
 def _placed(low: float, high: float, *, n_cells: int, length: int) -> Floats:
-    """(3 · 52, length): the cells' matrix with zeros around it, at the three shifts."""
+    """Put zeros around a matrix of cells, at the three shifts, (3 · 52, length)."""
     matrix = sampling_matrix(low, high, n_cells=n_cells, length=length)
     placed = np.zeros((_N_SHIFTS, n_cells + 2 * MAX_SHIFT, length))
     for shift in range(_N_SHIFTS):
@@ -161,11 +144,8 @@ def similarities(
     *,
     similarity: Similarity,
 ) -> Array:
-    """(b, n): how alike the features (b, 24, h, w) of target and reference are at each scale ratio.
-
-    "dot" is the mean over the cells of the scalar product of two feature vectors, "cosine" that of their
-    cosine.
-    """
+    """Compare features (b, 24, h, w) of target and reference at each scale ratio, (b, n)."""
+    # The mean over cells of the scalar product ("dot") or of the "cosine" of two feature vectors.
 
     def stacked(name: str) -> Array:
         return operations.constant(np.stack([getattr(each, name) for each in sampling]))

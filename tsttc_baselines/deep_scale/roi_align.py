@@ -1,8 +1,8 @@
-"""RoI align (He et al., Mask R-CNN, 2017) as two matrix products: rows of the map, then its columns.
+"""RoI align (He et al., Mask R-CNN, 2017) as two matrix products: rows of the map, then columns.
 
-The rules are torchvision's with `aligned=False` and `sampling_ratio=-1`: a cell is the mean of
-ceil(box side / cells) samples in each direction, each bilinear; the map's first value lies at 0; a sample
-before −1 or after the map's length is 0, and one between there and the edge takes the edge's value.
+As torchvision with `aligned=False`, `sampling_ratio=-1`: a cell is the mean of ceil(box side / cells)
+bilinear samples per direction; a sample before −1 or after the map's length is 0, and between there and the
+edge takes the edge's value.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 
 def sampling_matrix(low: float, high: float, *, n_cells: int, length: int) -> NDArray[np.float64]:
-    """(n_cells, length): times one axis of a map, the means in the cells of a box from `low` to `high` there.
+    """Return (n_cells, length): the matrix of means in the cells of `low` to `high` on one axis.
 
     A box narrower than 1 counts as 1 wide, as in torchvision.
 

@@ -47,7 +47,7 @@ _N_SORTED: Final = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pair:
-    """Two frames in colour, their boxes (4,) in pixels, and α."""
+    """Two colour frames, boxes (4,) in pixels, and α."""
 
     reference: Image
     target: Image
@@ -57,7 +57,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """The network's input for a pair and its label; the fit's sample if the fit is trained too."""
+    """The network's input and label of a pair, and perhaps the fit's."""
 
     crops: CropPair
     scale_ratio: float
@@ -65,26 +65,26 @@ class Sample:
 
 
 class Source(Protocol):
-    """Sequences with their true times to contact."""
+    """Sequences with true times to contact."""
 
     @property
     def truth(self) -> GroundTruth:
-        """The ground truth, in the order of the rows."""
+        """The ground truth, in row order."""
         ...
 
     @property
     def scale_ratios(self) -> Floats:
-        """(n,): α of the rows' pairs, as exactly as they are known."""
+        """The α of each row's pair, (n,)."""
         ...
 
     def clip(self, row: int) -> Clip:
-        """The sequence of a row."""
+        """Return the sequence of a row."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class RenderedSequences:
-    """The sequences of a simulated split; their frames are rendered once, and stay in memory as JPEG."""
+    """The sequences of a simulated split; frames are rendered once and kept as JPEG."""
 
     split: Split
     seed: int
@@ -92,16 +92,14 @@ class RenderedSequences:
 
     @property
     def truth(self) -> GroundTruth:
-        """As `Source`."""
         return self.split.truth
 
     @property
     def scale_ratios(self) -> Floats:
-        """As `Source`, from the distances: a time to contact is less exact while the vehicle brakes."""
+        # From distances: a time to contact is less exact while the vehicle brakes.
         return self.split.gap_m[:, TARGET] / self.split.gap_m[:, TARGET - FRAME_GAP]
 
     def clip(self, row: int) -> Clip:
-        """As `Source`."""
         if row not in self._rendered:
             self._rendered[row] = render(self.split, anno_id=row, seed=self.seed)
         return self._rendered[row].clip
@@ -109,7 +107,7 @@ class RenderedSequences:
 
 @dataclass(frozen=True, eq=False)
 class FolderSequences:
-    """The sequences of a folder, in the order of its ground truth."""
+    """The sequences of a folder, in its ground truth's order."""
 
     folder: SequenceFolder
     truth: GroundTruth
@@ -119,7 +117,7 @@ class FolderSequences:
 
     @classmethod
     def of(cls, folder: SequenceFolder, truth: GroundTruth) -> FolderSequences:
-        """The sequences of `truth`, by their natural keys; raises `Rejected` if the folder lacks one."""
+        """Match `truth` by natural keys; raises `Rejected` if the folder lacks one."""
         row_of = {key: row for row, key in enumerate(folder.manifest.natural_keys)}
         missing = [key for key in truth.manifest.natural_keys if key not in row_of]
         if missing:
@@ -132,16 +130,14 @@ class FolderSequences:
 
     @property
     def scale_ratios(self) -> Floats:
-        """As `Source`."""
         return ttc_to_scale_ratio(self.truth.ttc_s, fps_hz=fps_of_gap(FRAME_GAP))
 
     def clip(self, row: int) -> Clip:
-        """As `Source`; the clip raises `SequenceFault` for a frame that cannot be read."""
         return self.folder.clip(self.rows[row], cache=self._cache)
 
 
 def usable_pair(source: Source, row: int, *, scale_ratio: float) -> Pair:
-    """The pair of a row; raises `Unusable` where frames or boxes are missing or too small."""
+    """Return the pair of a row; raises `Unusable` for missing or too small frames or boxes."""
     clip = source.clip(row)
     boxes = boxes_of_pair(clip, frame_gap=FRAME_GAP)
     frames = clip.colour(TARGET - FRAME_GAP), clip.colour(TARGET)
@@ -153,11 +149,9 @@ def usable_pair(source: Source, row: int, *, scale_ratio: float) -> Pair:
 def batches(
     source: Source, *, use: Use, size: int, rng: np.random.Generator, fitting: Operations | None = None
 ) -> Iterator[tuple[int, list[Sample]]]:
-    """Batches of an epoch, each with its number of sequences: all rows once, in a random order.
-
-    Sequences that cannot be used, or whose α the network cannot say, are left out. With the network as
-    `fitting`, samples have what the fit learns from.
-    """
+    """Yield an epoch's batches in random order, with their numbers of sequences."""
+    # Unusable sequences and those with an α outside of the network's range are left out. With `fitting`,
+    # samples also train the fit.
     scale_ratios = source.scale_ratios
     rows = rng.permutation(len(scale_ratios))
     for first in range(0, len(rows), size * _N_SORTED):
@@ -195,13 +189,12 @@ def _sample(pair: Pair, *, use: Use, fitting: Operations | None, rng: np.random.
 
 
 def can_say(scale_ratio: float) -> bool:
-    """Whether α lies between the least and the greatest of the network's scale ratios."""
     scales = network_scales()
     return bool(scales[0] <= scale_ratio <= scales[-1])
 
 
 def augmented(pair: Pair, *, rng: np.random.Generator) -> Pair:
-    """The pair with other colours and boxes; perhaps mirrored, in the reverse order, or with another α."""
+    """Vary colours and boxes; perhaps mirror, reverse or resize the pair."""
     pair = _jittered(_recoloured(pair, rng=rng), rng=rng)
     if rng.random() < 0.5:
         pair = _mirrored(pair)
@@ -214,7 +207,7 @@ def augmented(pair: Pair, *, rng: np.random.Generator) -> Pair:
 
 
 def _recoloured(pair: Pair, *, rng: np.random.Generator) -> Pair:
-    """The same change of hue, saturation and brightness for both frames, as the paper's HSV augmentation."""
+    """Change hue, saturation and brightness of both frames alike, as the paper's HSV augmentation."""
     change = np.round(rng.uniform(-1, 1, 3) * _HSV).astype(np.int16)
 
     def recoloured(image: Image) -> Image:
@@ -248,7 +241,6 @@ def _mirrored(pair: Pair) -> Pair:
 
 
 def _resized(pair: Pair, ratio: float) -> Pair:
-    """The pair with a reference frame `ratio` times as large, to whole pixels."""
     height, width = pair.reference.shape[:2]
     size = max(1, round(width * ratio)), max(1, round(height * ratio))
     interpolation = cv2.INTER_AREA if ratio < 1 else cv2.INTER_LINEAR

@@ -1,7 +1,4 @@
-"""The operations of the network in torch: for training, and for a graphics card.
-
-torch comes with `pip install '.[train]'`.
-"""
+"""The network's operations in torch (`pip install '.[train]'`), for training and graphics cards."""
 
 from __future__ import annotations
 
@@ -22,16 +19,12 @@ BN_MOMENTUM = 0.03
 
 @dataclass(frozen=True, eq=False)
 class TorchLayers:
-    """The operations with these tensors, by the names of the weights.
-
-    With `training`, batches are normalised by their own means, and the running means follow them.
-    """
+    """The operations with these tensors, by weight name; `training` normalises batches by their own means."""
 
     tensors: Mapping[str, torch.Tensor]
     training: bool = False
 
     def block(self, name: str, images: torch.Tensor, *, stride: int = 1) -> torch.Tensor:
-        """As `network.Operations`."""
         weight = self.tensors[f"{name}.conv.weight"]
         outputs = F.conv2d(images, weight, stride=stride, padding=weight.shape[-1] // 2)
         outputs = F.batch_norm(
@@ -47,37 +40,29 @@ class TorchLayers:
         return F.silu(outputs)
 
     def upsampled(self, name: str, images: torch.Tensor) -> torch.Tensor:
-        """As `network.Operations`."""
         weight, bias = self.tensors[f"{name}.weight"], self.tensors[f"{name}.bias"]
         return F.conv_transpose2d(images, weight, bias, stride=2, padding=1, output_padding=1)
 
     def joined(self, one: torch.Tensor, other: torch.Tensor) -> torch.Tensor:
-        """As `network.Operations`."""
         return torch.cat((one, other), dim=1)
 
     def constant(self, values: NDArray[Any]) -> torch.Tensor:
-        """As `network.Operations`, on the device of the weights."""
         device = self.tensors["backbone.stem.conv.weight"].device
         # Crops lie with the channels last, as they stay here: convolutions are faster so.
         return torch.from_numpy(values.astype(np.float32, copy=False)).to(device)
 
     def permuted(self, values: torch.Tensor, axes: tuple[int, ...]) -> torch.Tensor:
-        """As `network.Operations`."""
         return values.permute(axes)
 
     def unit(self, vectors: torch.Tensor, *, axis: int) -> torch.Tensor:
-        """As `network.Operations`."""
         return vectors / (vectors.square().sum(axis, keepdim=True) + LEAST_NORM).sqrt()
 
     def greatest(self, values: torch.Tensor) -> torch.Tensor:
-        """As `network.Operations`."""
         return values.amax(-1)
 
     def linear(self, name: str, values: torch.Tensor) -> torch.Tensor:
-        """As `network.Operations`."""
         return F.linear(values, self.tensors[f"{name}.weight"], self.tensors[f"{name}.bias"])
 
     def values(self, array: torch.Tensor) -> NDArray[np.float32]:
-        """As `network.Operations`."""
         numbers: NDArray[np.float32] = array.detach().cpu().numpy()
         return numbers

@@ -1,10 +1,9 @@
-"""Training of the network, in torch: the paper's recipe (§5.2, §6.1), and what may be varied of it.
+"""Training of the network in torch: the paper's recipe (§5.2, §6.1) and its variations.
 
     trained = train(source=…, validation=…, recipe=Recipe(), out=Path("weights.npz"))
 
-The label of a scale ratio α_i is max(0, 1 − |α_i − α| / Δ), Δ the distance of two of them (toolkit,
-`gt_to_one_hot`); the loss is their binary cross-entropy, summed over the scale ratios. After each epoch the
-evaluator scores the network on other sequences.
+The label of a scale ratio α_i is max(0, 1 − |α_i − α| / Δ), Δ their distance (toolkit, `gt_to_one_hot`); the
+loss is the binary cross-entropy, summed over scale ratios. The evaluator scores each epoch.
 """
 
 from __future__ import annotations
@@ -62,12 +61,11 @@ class DeviceMissing(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """How to train; the defaults are the paper's, and the toolkit's where the paper says nothing.
+    """The training's settings; defaults are the paper's, else the toolkit's.
 
-    The learning rate of a batch is `lr_per_pair` times its size. It grows for the first epoch of 36, falls as
-    a cosine, and stays low for the last four; of fewer epochs, in the first and last parts. `ratio_weight`
-    adds |ln α̂ − ln α| to the loss, so many times, and `fit_weight` what a step of the fit errs, in MiD; the
-    paper has neither.
+    A batch's learning rate is `lr_per_pair` times its size: warm-up in the first of 36 epochs, cosine, low
+    for the last four (or these parts of fewer). `ratio_weight` multiplies |ln α̂ − ln α| in the loss,
+    `fit_weight` the error of a step of the fit in MiD; the paper has neither.
     """
 
     epochs: int = 36
@@ -81,7 +79,7 @@ class Recipe:
     use: Use = field(default_factory=lambda: Use(similarity="cosine"))
 
     def learning_rate(self, progress: float) -> float:
-        """At `progress`, 0 … 1 of all epochs: YOLOX's "yoloxwarmcos"."""
+        """Return the rate at `progress`, 0 … 1 of all epochs: YOLOX's "yoloxwarmcos"."""
         greatest = self.lr_per_pair * self.batch
         warm, last = 1 / 36, 32 / 36
         if progress < warm:
@@ -92,11 +90,9 @@ class Recipe:
 
 @dataclass(frozen=True, slots=True)
 class Epoch:
-    """The figures of an epoch: the mean loss of a pair, and the evaluator's scores on the other sequences.
+    """An epoch's mean loss of a pair, and the evaluator's scores; number 0 is the start, without a loss."""
 
-    `n_left_out` counts the sequences that nothing was learned from: a frame or a box is missing or too small,
-    or the network has no such scale ratio. Number 0 has the scores before epoch 1, and no loss.
-    """
+    # `n_left_out` counts sequences without usable frames, boxes or scale ratio.
 
     number: int
     n_left_out: int
@@ -108,12 +104,10 @@ class Epoch:
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """The sequences on which an epoch is scored."""
-
     source: Source
 
     def scores(self, operations: TorchLayers, *, use: Use) -> dict[str, Any]:
-        """The evaluator's report: means by metric, for each TTC range."""
+        """Return the evaluator's means by metric and TTC range."""
         truth = self.source.truth
         scale_ratios = [self._scale_ratio(operations, row, use=use) for row in range(truth.n_sequences)]
         ttc_s = scale_ratio_to_ttc(scale_ratios, fps_hz=fps_of_gap(5))
@@ -121,7 +115,7 @@ class Validation:
         return {name: score.means for name, score in report.scores.items()}
 
     def _scale_ratio(self, operations: TorchLayers, row: int, *, use: Use) -> float:
-        """α̂, or what `tsttc baseline run` takes where there is none: the root of the boxes' areas, or 1."""
+        """Estimate α, or the fallback of `tsttc baseline run`: the root of the boxes' areas, or 1."""
         try:
             pair = usable_pair(self.source, row, scale_ratio=1.0)
         except Unusable:
@@ -140,21 +134,21 @@ class Validation:
 
 
 def mean_scale_ratio(logits: torch.Tensor) -> torch.Tensor:
-    """(b,): α̂ of logits (b, 20), the mean of the best scale ratios weighted by their confidences."""
+    """Compute α̂ (b,) from logits (b, 20): the mean of the best, weighted by confidence."""
     best = torch.sigmoid(logits).topk(N_TOP, dim=1)
     scales = torch.as_tensor(network_scales(), dtype=torch.float32, device=logits.device)
     return (best.values * scales[best.indices]).sum(1) / best.values.sum(1)
 
 
 def labels(scale_ratios: Sequence[float]) -> Floats:
-    """(b, 20): the soft labels; each row adds up to 1."""
+    """Return the soft labels (b, 20); each row adds up to 1."""
     scales = network_scales()
     distance = np.abs(np.subtract.outer(np.asarray(scale_ratios), scales)) / (scales[1] - scales[0])
     return np.asarray(np.maximum(0.0, 1.0 - distance))
 
 
 def new_tensors(*, seed: int) -> dict[str, torch.Tensor]:
-    """Weights to begin with: Kaiming's, as torch has them; the linear layer passes on which is most alike."""
+    """Draw initial weights: Kaiming's; the linear layer passes on the greatest similarity."""
     generator = torch.Generator().manual_seed(seed)
     tensors = {}
     for name, shape in SHAPES.items():
@@ -172,7 +166,7 @@ def new_tensors(*, seed: int) -> dict[str, torch.Tensor]:
 
 
 class Network:
-    """The tensors of a network that learns, and its optimizer."""
+    """The tensors of a learning network, and its optimizer."""
 
     def __init__(self, tensors: dict[str, torch.Tensor], *, recipe: Recipe, device: str) -> None:
         self.recipe = recipe
@@ -192,7 +186,7 @@ class Network:
             self.optimizer = torch.optim.AdamW(groups, lr=0.0, betas=(0.9, 0.98))
 
     def learn(self, samples: Sequence[Sample], *, learning_rate: float) -> float:
-        """One step; returns the mean loss of a pair."""
+        """Take one step; return the mean loss of a pair."""
         for group in self.optimizer.param_groups:
             group["lr"] = learning_rate
         logits = network_logits(
@@ -213,11 +207,8 @@ class Network:
         return float(loss.detach()) + self.recipe.fit_weight * error
 
     def _learn_to_fit(self, samples: Sequence[FitSample]) -> float:
-        """Begins the gradients with those of what the fit errs in the mean, in MiD, and returns that.
-
-        Batches are normalised as in inference: each pair is a batch of its own, of its own size. The pairs
-        are learned from side by side.
-        """
+        """Add the gradients of the fit's mean error in MiD, and return that error."""
+        # As in inference, each pair is a batch of its own, of its own size.
         operations = TorchLayers(self.tensors)
         learned = [
             tensor
@@ -236,18 +227,15 @@ class Network:
         return float(sum(errors))
 
     def operations(self) -> TorchLayers:
-        """The network as it infers."""
         return TorchLayers({name: tensor.detach() for name, tensor in self.tensors.items()})
 
     def weights(self, *, card: dict[str, Any]) -> Weights:
-        """The weights as they are now."""
         tensors = {name: tensor.detach().cpu().numpy().copy() for name, tensor in self.tensors.items()}
         return Weights(tensors, self.recipe.use, card)
 
 
 @contextmanager
 def _one_thread_each() -> Iterator[int]:
-    """Limit torch to one thread inside; yields the number of threads that it had."""
     n_threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -266,7 +254,7 @@ def _loss(logits: torch.Tensor, scale_ratios: Sequence[float], *, ratio_weight: 
 
 
 def fit_error(operations: TorchLayers, sample: FitSample) -> torch.Tensor:
-    """The error of a step of the fit, in MiD; large errors count less."""
+    """Compute a step's error in MiD; large errors count less."""
     target, reference = (evened(maps) for maps in features(operations, operations.constant(sample.pixels)))
     rows, columns = (operations.constant(offsets) for offsets in sample.grid.offsets())
     design, errors = equations(torch, target, reference, grid=sample.grid, offsets=(rows, columns))
@@ -288,13 +276,12 @@ def train(
     progress: Progress = lambda _n_done: None,
     after_epoch: Callable[[Epoch], None] = lambda _epoch: None,
 ) -> list[Epoch]:
-    """Train, and write to `out` the weights of the epoch with the least MiD.
+    """Train, and write the weights of the epoch with the least MiD to `out`.
 
-    With a `start`, the epochs begin with number 0: how the start scores, used as `recipe.use` says, which
-    should be its own use. `progress` is told how many sequences were learned from, of `epochs` times those of
-    the source. A training that was ended has left `out` with `.part` after it; the same call goes on after
-    the last whole epoch.
-    Raises `Rejected` where no sequence can be used, `DeviceMissing` and `OSError`.
+    A `start` is scored as epoch 0, with `recipe.use`, which should be its own. `progress` gets the number of
+    trained sequences of all epochs. An interrupted training leaves `out` with `.part`; the same call
+    continues after the last whole epoch. Raises `Rejected` if no sequence is usable, `DeviceMissing` and
+    `OSError`.
     """
     if device == "cuda" and not torch.cuda.is_available():
         raise DeviceMissing
@@ -346,7 +333,6 @@ def _epoch(scores: dict[str, Any], *, number: int, losses: Sequence[float], n_le
 
 
 def card_of(recipe: Recipe, source: Source, epochs: Sequence[Epoch]) -> dict[str, Any]:
-    """The training record in the weights' file."""
     return {
         "recipe": {name: value for name, value in asdict(recipe).items() if name != "use"},
         "data": {"sequences": int(source.truth.n_sequences), "digest": source.truth.digest},
@@ -356,7 +342,6 @@ def card_of(recipe: Recipe, source: Source, epochs: Sequence[Epoch]) -> dict[str
 
 
 def _key(source: Source, recipe: Recipe, start: Weights | None) -> str:
-    """Names a training: the same name, the same weights."""
     named = hashlib.sha256(json.dumps([asdict(recipe), source.truth.digest, torch.__version__]).encode())
     for tensor in start.tensors.values() if start else ():
         named.update(tensor.tobytes())
@@ -366,7 +351,7 @@ def _key(source: Source, recipe: Recipe, start: Weights | None) -> str:
 def _begun(
     part: Path, *, key: str, recipe: Recipe, start: Weights | None, device: str
 ) -> tuple[Network, list[Epoch]]:
-    """The network after the last whole epoch of this training, and its epochs."""
+    """Return the network after this training's last whole epoch, and its epochs."""
     try:
         state = torch.load(part, map_location=device, weights_only=True)
     except (OSError, RuntimeError, ValueError, EOFError, pickle.UnpicklingError):
@@ -383,7 +368,6 @@ def _begun(
 
 
 def _keep(part: Path, *, key: str, network: Network, epochs: Sequence[Epoch]) -> None:
-    """Write the state from which a later run continues; the file appears whole."""
     new = part.with_name(part.name + ".new")
     state = {
         "key": key,

@@ -1,7 +1,7 @@
 """Weights of the network: the project's own file, or the toolkit's checkpoint.
 
-The own file is a zip without pickles that `numpy.load` opens too: `card.json`, and an `.npy` file for each
-tensor. The card says how the network is to be used and how it was made.
+The own file is a zip without pickles: `card.json`, the use and origin of the weights, and an `.npy` per
+tensor.
 """
 
 from __future__ import annotations
@@ -59,12 +59,11 @@ SHAPES: Final = _shapes()
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """How weights are to be used; the defaults are the toolkit's, whose weights do not say it.
+    """How weights are used; the defaults are the toolkit's.
 
-    `similarity` of two feature vectors: the paper words "cosine", the toolkit's weights are for "dot".
-    `n_cells` is the paper's target size. Frames are shrunk until the longer side of the target's box has
-    `max_box_px`. Crops have `margin_px` around what is compared.
-    `decoding` is how a scale ratio is made of what the network says (`estimator.DeepScale`).
+    `similarity` is "cosine" in the paper, "dot" for the toolkit's weights. `n_cells` is the paper's target
+    size. Frames are shrunk until the target's box has at most `max_box_px` on its longer side; crops have
+    `margin_px` around. `decoding` is as in `DeepScale`.
     """
 
     similarity: Similarity = "dot"
@@ -76,7 +75,7 @@ class Use:
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """The network's tensors, how to use them, and the rest of their card."""
+    """The network's tensors, their use, and the rest of their card."""
 
     tensors: Tensors
     use: Use = field(default_factory=Use)
@@ -84,7 +83,7 @@ class Weights:
 
 
 def read_weights(path: Path) -> Weights:
-    """The weights of a file of this project or of the toolkit; raises `Rejected`, and `OSError`."""
+    """Read weights of this project or of the toolkit; raises `Rejected` and `OSError`."""
     with path.open("rb") as file:
         data = file.read(MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
@@ -103,7 +102,7 @@ def read_weights(path: Path) -> Weights:
 
 
 def write_weights(path: Path, weights: Weights) -> None:
-    """Write the project's own file; the same weights give the same bytes."""
+    """Write the project's own file, always the same bytes."""
     card = {**weights.card, "use": asdict(weights.use)}
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         _add(archive, CARD, (json.dumps(card, indent=1, ensure_ascii=False) + "\n").encode())
@@ -143,7 +142,7 @@ def _read_own(archive: zipfile.ZipFile) -> Weights:
 
 
 def _array(data: bytes, shape: Shape) -> NDArray[np.float32] | None:
-    """The numbers of an `.npy` file whose header says just this; None for any other."""
+    """Read an `.npy` file with exactly this header, else None."""
     buffer = io.BytesIO()
     np.lib.format.write_array_header_1_0(buffer, {"descr": "<f4", "fortran_order": False, "shape": shape})
     header = buffer.getvalue()
@@ -164,7 +163,6 @@ def _read_card(archive: zipfile.ZipFile) -> dict[str, Any]:
 
 
 def _read_use(entry: object) -> Use:
-    """Read the card's settings for using the weights; raises `Rejected`."""
     # Cards that were written before there was a choice have no decoding.
     known = {each.name for each in fields(Use)}
     if isinstance(entry, dict) and known - {"decoding"} <= entry.keys() <= known:

@@ -20,7 +20,7 @@ _NOISE_SIZE: Final = (640, 1088)
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """The camera's state during one sequence. Arrays are (6,), one value for each frame."""
+    """The camera's state during one sequence, (6,) by frame."""
 
     gain: Floats
     offset: Floats
@@ -37,7 +37,7 @@ class Exposure:
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Exposure:
-        """Gain e^N(0, .05), offset N(0, 4) and pitch N(0, .3 px) for each frame; the rest for all six."""
+        """Draw gain e^N(0, .05), offset N(0, 4) and pitch N(0, .3 px) by frame, the rest once."""
         return cls(
             gain=np.exp(rng.normal(scale=0.05, size=N_FRAMES)) * rng.uniform(0.75, 1.05),
             offset=rng.normal(scale=4.0, size=N_FRAMES),
@@ -57,11 +57,9 @@ def _noise_field() -> NDArray[np.float32]:
 
 
 def expose(scene: Image, *, exposure: Exposure, frame: int) -> Image:
-    """The scene (height, width, 3), at the camera's resolution, as the sensor delivers it.
-
-    Shot noise grows with the root of the brightness. The noise is a random window of one field, which costs a
-    tenth of new noise and cannot be told from it within six frames.
-    """
+    """Expose the scene (height, width, 3) as the sensor delivers it."""
+    # Shot noise grows with the root of the brightness. A random window of one field costs a tenth of new
+    # noise, and six frames do not show it.
     height, width = scene.shape[:2]
     blurred = cv2.GaussianBlur(scene, (0, 0), exposure.defocus_px)
     across, down = exposure.shading
@@ -79,7 +77,6 @@ def expose(scene: Image, *, exposure: Exposure, frame: int) -> Image:
 
 
 def encode(image: Image) -> bytes:
-    """The image as JPEG."""
     done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     if not done:
         raise ArithmeticError(f"OpenCV cannot encode an image of shape {image.shape}.")
@@ -87,11 +84,9 @@ def encode(image: Image) -> bytes:
 
 
 def detect(boxes: Floats, *, rng: np.random.Generator) -> Floats:
-    """Boxes (6, 4) as a detector finds them: each edge is off by N(0, 1.5 % of the side + 0.6 px).
-
-    A detector errs in the same way on frames that look alike, so the errors of two frames correlate by 0.75.
-    The area rule then has the relative errors of the published row.
-    """
+    """Detect boxes (6, 4): each edge is off by N(0, 1.5 % of the side + 0.6 px)."""
+    # Errors of two frames correlate by 0.75, as on frames that look alike; the area rule then has the errors
+    # of the published row.
     sides = boxes[:, 2:] - boxes[:, :2]
     scale = np.tile(0.015 * sides + 0.6, 2)
     shared, own = rng.normal(size=(1, 4)), rng.normal(size=boxes.shape)

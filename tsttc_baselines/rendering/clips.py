@@ -1,8 +1,7 @@
-"""From the motion of a sequence to its six frames: scenery, road and vehicle drawn in turn, then the camera.
+"""From a sequence's motion to its six frames: scenery, road, vehicle, camera."""
 
-The planes of a small vehicle are warped onto a grid up to three times as fine as the image and averaged, so
-that their scale is true to some hundredths of a pixel. What stands behind needs no such care.
-"""
+# The planes of a small vehicle are warped onto a grid up to three times as fine and averaged, so that their
+# scale is true to some hundredths of a pixel.
 
 from __future__ import annotations
 
@@ -34,7 +33,7 @@ _NEAREST_ROAD_M: Final = 1.2
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The part of the 1024 × 576 image that is rendered, in whole pixels."""
+    """The rendered part of the 1024 × 576 image, in whole pixels."""
 
     left: int
     top: int
@@ -44,7 +43,7 @@ class View:
 
 @dataclass(frozen=True)
 class Rendered:
-    """One sequence to be rendered, its frames when they are asked for. Boxes are in pixels of `view`."""
+    """One sequence, its frames rendered on access; boxes are in pixels of `view`."""
 
     anno_id: int
     view: View
@@ -56,13 +55,10 @@ class Rendered:
 
     @cached_property
     def jpegs(self) -> tuple[bytes, ...]:
-        """The six frames as they lie in a folder."""
         return tuple(self._jpeg(frame) for frame in range(N_FRAMES))
 
     @cached_property
     def clip(self) -> Clip:
-        """The sequence as the baselines take it, decoded from the JPEGs."""
-
         def load(frame: int, colour: bool) -> Image:
             data = np.frombuffer(self._jpeg(frame), dtype=np.uint8)
             flag = cv2.IMREAD_COLOR if colour else cv2.IMREAD_GRAYSCALE
@@ -82,7 +78,7 @@ class Rendered:
 
 @dataclass(frozen=True, slots=True)
 class _Scene:
-    """Everything of a sequence that the frames share, and its motion: arrays are (6,)."""
+    """What a sequence's frames share, and its motion, (6,)."""
 
     vehicle: int
     focal_px: float
@@ -106,8 +102,8 @@ class _Scene:
 def render(split: Split, *, anno_id: int, seed: int, view: View | None = None) -> Rendered:
     """Render one sequence of a split; the same split and seed give the same bytes, in any order.
 
-    Without `view`, the vehicle is rendered with half its box more on each side, as much as baselines can look
-    at. `anno_id` is from 0 to `split.n_sequences` − 1.
+    The default `view` has half the vehicle's box on each side. `anno_id` is from 0 to `split.n_sequences` −
+    1.
     """
     rng = np.random.default_rng([seed, anno_id])
     exposure = camera.Exposure.draw(rng)
@@ -134,19 +130,13 @@ def render(split: Split, *, anno_id: int, seed: int, view: View | None = None) -
 
 
 def boxes(split: Split, *, anno_id: int, seed: int) -> tuple[Floats, Floats]:
-    """The true and the detected boxes of a sequence, (6, 4) each, in pixels of the 1024 × 576 image.
-
-    These are the boxes of `render`, without rendering anything.
-    """
+    """Return a sequence's true and detected boxes, (6, 4) in pixels of the 1024 × 576 image."""
     rng = np.random.default_rng([seed, anno_id])
     return _both_boxes(split, anno_id, exposure=camera.Exposure.draw(rng), rng=rng)
 
 
 def view_of(true_boxes: Floats) -> View:
-    """What `render` shows: the true boxes with half the target's size and 10 px more on each side.
-
-    `true_boxes` is (6, 4), in pixels of the 1024 × 576 image, inside of which the view stays.
-    """
+    """Return the view of true boxes (6, 4), with half the target's size and 10 px more on each side."""
     margin_px = 0.5 * (true_boxes[TARGET, 2:] - true_boxes[TARGET, :2]) + 10
     low = np.floor(np.maximum(true_boxes[:, :2].min(axis=0) - margin_px, 0)).astype(int)
     high = np.minimum(true_boxes[:, 2:].max(axis=0) + margin_px, (IMAGE_WIDTH_PX, IMAGE_HEIGHT_PX))
@@ -162,7 +152,8 @@ def _both_boxes(
 
 
 def _true_boxes(split: Split, anno_id: int, *, pitch_px: Floats) -> Floats:
-    """(6, 4): the vehicle's outline in the 1024 × 576 image; the top is the cabin's, which is farther."""
+    """Compute the vehicle's outline (6, 4) in the 1024 × 576 image."""
+    # The top is the cabin's, which is farther.
     vehicle = VEHICLES[split.vehicle[anno_id]]
     focal_px, gap_m = split.focal_px[anno_id], split.gap_m[anno_id]
     middle_px = _CENTRE_PX[0] + focal_px * split.lateral_m[anno_id] / gap_m
@@ -206,7 +197,6 @@ def _draw_occluder(rng: np.random.Generator) -> tuple[float, float, float] | Non
 
 
 def _draw(scene: _Scene, frame: int, *, view: View, horizon_px: float) -> Image:
-    """One frame without what the camera does."""
     canvas = _Canvas(scene, frame, view=view, horizon_px=horizon_px)
     canvas.draw_scenery()
     canvas.draw_road()
@@ -221,7 +211,7 @@ def _draw(scene: _Scene, frame: int, *, view: View, horizon_px: float) -> Image:
 
 
 class _Canvas:
-    """Draws one frame from metres to the right of the optical axis, above the ground, and ahead."""
+    """Draws one frame from metres right of the optical axis, above the ground, and ahead."""
 
     def __init__(self, scene: _Scene, frame: int, *, view: View, horizon_px: float) -> None:
         self._scene = scene
@@ -234,11 +224,10 @@ class _Canvas:
 
     @property
     def image(self) -> Image:
-        """The drawn image, in colour."""
         return np.asarray(cv2.cvtColor(self._pixels, cv2.COLOR_BGRA2BGR), dtype=np.uint8)
 
     def _project(self, x_m: Floats, y_m: Floats, depth_m: Floats) -> Floats:
-        """(…, 2): pixels from the edge of the first one."""
+        """Project to pixels (…, 2) from the edge of the first one."""
         scale = self._scene.focal_px / depth_m
         projected = np.empty((*scale.shape, 2))
         projected[..., 0] = self._x0 + scale * x_m
@@ -246,12 +235,10 @@ class _Canvas:
         return projected
 
     def _fill(self, polygons_px: Floats, colour: Colour) -> None:
-        """Fill polygons (n, corners, 2) that do not overlap."""
         fixed = np.clip(np.round((polygons_px - 0.5) * 16), -(2**20), 2**20).astype(np.int32)
         cv2.fillPoly(self._pixels, list(fixed), (*colour, 255), cv2.LINE_AA, 4)
 
     def draw_scenery(self) -> None:
-        """Everything above the ground: a plane that grows as ego comes nearer."""
         scene = self._scene
         now_m = float(scene.scenery_m[self._frame])
         # A texel is a pixel of the target frame.
@@ -272,7 +259,6 @@ class _Canvas:
         )
 
     def draw_road(self) -> None:
-        """The ground below the scenery, with lines that come nearer at ego's speed."""
         scene = self._scene
         far_m = float(scene.scenery_m[self._frame])
         first = max(0, int(np.ceil(self._y0 + scene.focal_px * CAMERA_HEIGHT_M / far_m)))
@@ -314,7 +300,6 @@ class _Canvas:
         self._fill(self._project(across_m, np.zeros(1), depth_m), _LINE_PAINT)
 
     def draw_side(self) -> None:
-        """The side of a vehicle in a neighbouring lane, as far as it is seen."""
         scene, vehicle = self._scene, VEHICLES[self._scene.vehicle]
         gap_m, middle_m = float(scene.gap_m[self._frame]), float(scene.lateral_m[self._frame])
         edge_m = middle_m - np.sign(middle_m) * vehicle.width_m * 0.48
@@ -340,7 +325,6 @@ class _Canvas:
             fill(0.0, 0.32, start, start + 0.16, (26, 25, 25))
 
     def draw_plane(self, texture: Texture, *, depth_m: float) -> None:
-        """Blend an upright plane of the vehicle over the canvas."""
         scene, fine = self._scene, self._scene.fineness
         pixels_per_m = scene.focal_px / depth_m
         texture = texture.mipmap(texels_per_pixel=texture.texels_per_m / pixels_per_m / fine)
@@ -363,7 +347,7 @@ class _Canvas:
         self._pixels[y1:y2, x1:x2] = cv2.blendLinear(over, under, weight, 1 - weight)
 
     def draw_occluder(self) -> None:
-        """A post between camera and vehicle, half as far, which does not move."""
+        """Draw a fixed post between camera and vehicle, half as far."""
         if self._scene.occluder is None:
             return
         scene, vehicle = self._scene, VEHICLES[self._scene.vehicle]
@@ -380,6 +364,7 @@ class _Canvas:
 
 
 def _matrix(texels: float, x_shift: float, y_shift: float) -> Floats:
-    """From image to texture at `texels` a pixel. Shifts count from edges, OpenCV from centres."""
+    """Return the matrix from image to texture at `texels` a pixel."""
+    # Shifts count from edges, OpenCV from centres.
     middle = 0.5 * texels - 0.5
     return np.array([[texels, 0.0, x_shift + middle], [0.0, texels, y_shift + middle]])

@@ -25,8 +25,6 @@ Progress = Callable[[int], None]
 
 
 class Renderer:
-    """Renders sequences of a split into a folder, one at a time."""
-
     def __init__(self, *, split: Split, seed: int, images: Path) -> None:
         self._split = split
         self._seed = seed
@@ -34,7 +32,7 @@ class Renderer:
         cv2.setNumThreads(1)
 
     def __call__(self, row: int) -> tuple[int, Floats]:
-        """Write the six images of a sequence; return its row, and its boxes, (6, 4)."""
+        """Write the six images of a sequence; return its row, and its boxes (6, 4)."""
         rendered = render(self._split, anno_id=row, seed=self._seed)
         for frame, jpeg in enumerate(rendered.jpegs):
             image_path(self._split, row, frame, images=self._images).write_bytes(jpeg)
@@ -42,7 +40,6 @@ class Renderer:
 
 
 def image_path(split: Split, row: int, frame: int, *, images: Path) -> Path:
-    """The path of a frame: `{bag_stamp}/cam{cam_id}/{ts}.jpg`."""
     ts_ns = split.table.ts_ns[row] - (N_FRAMES - 1 - frame) * FRAME_STEP_NS
     return images / split.table.bag_stamp[row] / f"cam{split.table.cam_id[row]}" / f"{ts_ns}.jpg"
 
@@ -56,10 +53,8 @@ def write_folder(
     n_processes: int = 1,
     progress: Progress = lambda _n_done: None,
 ) -> None:
-    """Render these sequences of a split into `path`, an empty or new folder.
-
-    The manifest is written last: a folder that has one is whole. Raises `OSError` and `WorkerEnded`.
-    """
+    """Render rows of a split into `path`, an empty or new folder; raises `OSError` and `WorkerEnded`."""
+    # The manifest comes last: a folder that has one is complete.
     images = path / IMAGES
     for row in rows:
         image_path(split, row, 0, images=images).parent.mkdir(parents=True, exist_ok=True)

@@ -22,7 +22,7 @@ ROAD_SIZE: Final = (640, 840)
 
 @lru_cache(maxsize=N_SCENERIES)
 def scenery(number: int) -> Image:
-    """Sky, far hills, and trees and buildings that leave the middle open; `SCENERY_SIZE`, four channels."""
+    """Draw sky, hills, trees and buildings with an open middle; `SCENERY_SIZE`, four channels."""
     rng = np.random.default_rng([11, number])
     height, width = SCENERY_SIZE
     image = _sky(rng, height=height, width=width)
@@ -85,7 +85,7 @@ def _draw_buildings(image: Image, rng: np.random.Generator) -> None:
 
 @lru_cache(maxsize=N_ROADS)
 def road(number: int) -> Image:
-    """The ground from above, `ROAD_SIZE`, four channels: asphalt, shoulders, grass; streaks run along it."""
+    """Draw the ground from above, `ROAD_SIZE`, four channels: asphalt, shoulders, grass."""
     rng = np.random.default_rng([13, number])
     height, width = ROAD_SIZE
     across_m = np.abs((np.arange(width) + 0.5 - width / 2) * ROAD_M_PER_TEXEL)

@@ -1,7 +1,6 @@
-"""Textures: images of planes in the scene, and the 1/f noise that makes them uneven.
+"""Textures: images of planes in the scene, and the 1/f noise that makes them uneven."""
 
-Images have four channels, the fourth for opacity: OpenCV warps four in less than half the time of three.
-"""
+# Four channels, the fourth for opacity: OpenCV warps four in less than half the time of three.
 
 from __future__ import annotations
 
@@ -24,7 +23,7 @@ SUBPIXEL_BITS: Final = 4
 
 @dataclass(slots=True)
 class Texture:
-    """An upright plane, (height, width, 4), placed in metres right of and above the vehicle's foot."""
+    """An upright plane, (height, width, 4), in metres right of and above the vehicle's foot."""
 
     pixels: Image
     left_m: float
@@ -33,7 +32,7 @@ class Texture:
     _halves: list[Texture] = field(default_factory=list)
 
     def mipmap(self, *, texels_per_pixel: float) -> Texture:
-        """The texture, halved until it has at most 1.6 texels for each pixel of the canvas."""
+        """Halve the texture until it has at most 1.6 texels per pixel of the canvas."""
         height, width = self.pixels.shape[0] // 2, self.pixels.shape[1] // 2
         if texels_per_pixel <= 1.6 or min(height, width) < 4:
             return self
@@ -51,13 +50,12 @@ class Texture:
 
 
 def as_image(array: object) -> Image:
-    """The array as grey levels or colours of 8 bits."""
     return np.asarray(array, dtype=np.uint8)
 
 
 @lru_cache(maxsize=1)
 def noise_field() -> NDArray[np.float32]:
-    """(1024, 1024): 1/f noise that tiles, of mean 0 and deviation 1."""
+    """Make 1/f noise that tiles, (1024, 1024), mean 0, deviation 1."""
     rng = np.random.default_rng(7)
     spectrum = np.fft.rfft2(rng.standard_normal((1024, 1024)))
     frequency = np.hypot(np.fft.fftfreq(1024)[:, None], np.fft.rfftfreq(1024)[None, :])
@@ -67,6 +65,6 @@ def noise_field() -> NDArray[np.float32]:
 
 
 def noise(rng: np.random.Generator, *, height: int, width: int) -> NDArray[np.float32]:
-    """(height, width): a random window of the noise field, at most 1024 texels a side."""
+    """Cut a random window of the noise field, (height, width), at most 1024 a side."""
     top, left = rng.integers(1024 - height + 1), rng.integers(1024 - width + 1)
     return noise_field()[top : top + height, left : left + width]

@@ -37,14 +37,14 @@ class Rear:
 
 @lru_cache(maxsize=1)
 def _irregularity() -> Image:
-    """(1024, 1024, 4): the noise field around 128, which leaves opacity alone."""
+    # Around 128; opacity stays.
     grey = np.clip(128 + 24 * noise_field(), 0, 255)
     return as_image(cv2.merge([grey, grey, grey, np.full_like(grey, 128)]))
 
 
 @lru_cache(maxsize=32)
 def _shadow(kind: int, texels: int) -> Image:
-    """The dark under a vehicle: black texels whose opacity fades to the sides; where a drawing begins."""
+    """Draw the shadow under a vehicle, fading to the sides."""
     vehicle = VEHICLES[kind]
     texels_per_m = texels / vehicle.width_m
     width = round(vehicle.width_m * (1 + 2 * _MARGIN) * texels_per_m)
@@ -58,10 +58,9 @@ def _shadow(kind: int, texels: int) -> Image:
 
 
 class _Drawing:
-    """Draws on a texture in metres: x to the right of the vehicle's middle, y up from the ground.
+    """A texture drawn in metres: x right of the vehicle's middle, y up from the ground."""
 
-    Texels are opaque where something has been drawn. They begin as the shadow, or as nothing.
-    """
+    # Texels are opaque where something has been drawn. They begin as the shadow, or as nothing.
 
     def __init__(self, kind: int, *, texels: int, with_shadow: bool) -> None:
         vehicle = VEHICLES[kind]
@@ -72,7 +71,6 @@ class _Drawing:
         self.pixels = shadow.copy() if with_shadow else np.zeros_like(shadow)
 
     def polygon(self, corners_m: Sequence[tuple[float, float]], colour: Colour) -> None:
-        """Fill a polygon."""
         corners = (np.array(corners_m) - (self.left_m, self.top_m)) * (self.texels_per_m, -self.texels_per_m)
         fixed = np.round((corners - 0.5) * 2**SUBPIXEL_BITS).astype(np.int32)
         cv2.fillPoly(self.pixels, [fixed], (*colour, 255), cv2.LINE_AA, SUBPIXEL_BITS)
@@ -96,7 +94,7 @@ class _Drawing:
         )
 
     def shade(self, rng: np.random.Generator, *, dirt: float) -> None:
-        """Light from above, `dirt` (0 … 1) from below, and fine irregularity."""
+        """Add light from above, `dirt` (0 … 1) from below, and fine irregularity."""
         height, width = self.pixels.shape[:2]
         top, left = rng.integers(1024 - height + 1), rng.integers(1024 - width + 1)
         uneven = _irregularity()[top : top + height, left : left + width]
@@ -109,7 +107,6 @@ class _Drawing:
         self.pixels = as_image(cv2.addWeighted(uneven_pixels, 1, light, 1, -128))
 
     def texture(self) -> Texture:
-        """The image drawn so far."""
         return Texture(
             pixels=self.pixels.copy(),
             left_m=self.left_m,
@@ -127,7 +124,7 @@ def _darker(colour: Colour, factor: float) -> Colour:
 
 
 def rear(kind: int, *, texels: int, rng: np.random.Generator) -> Rear:
-    """Draw a vehicle of this kind, `texels` (at most 512) across its width."""
+    """Draw a vehicle of this kind, `texels` (at most 512) across."""
     vehicle = VEHICLES[kind]
     paints = _TARPAULINS if vehicle.name == "truck" else _PAINTS
     paint = paints[int(rng.integers(len(paints)))]
@@ -148,7 +145,6 @@ def rear(kind: int, *, texels: int, rng: np.random.Generator) -> Rear:
 
 
 def _draw_tail(drawing: _Drawing, vehicle: Vehicle, *, paint: Colour, rng: np.random.Generator) -> None:
-    """The lower half of a car: body, bumper, tyres, plate."""
     width_m, waist_m = vehicle.width_m, _waist_m(vehicle)
     half = width_m / 2
     for side in (-1, 1):
@@ -181,7 +177,6 @@ def _draw_tail(drawing: _Drawing, vehicle: Vehicle, *, paint: Colour, rng: np.ra
 
 
 def _waist_m(vehicle: Vehicle) -> float:
-    """Where the body ends and the cabin begins."""
     return {"sedan": 0.7, "hatchback": 0.64, "suv": 0.62, "van": 0.5}.get(
         vehicle.name, 1.0
     ) * vehicle.height_m
@@ -190,7 +185,6 @@ def _waist_m(vehicle: Vehicle) -> float:
 def _draw_cabin(
     drawing: _Drawing, vehicle: Vehicle, *, paint: Colour, glass: Colour, rng: np.random.Generator
 ) -> None:
-    """The upper half of a car: roof, pillars, rear window with a reflection."""
     half, waist_m, top_m = vehicle.width_m / 2, _waist_m(vehicle), vehicle.height_m
     roof = {"sedan": 0.68, "hatchback": 0.74, "suv": 0.8, "van": 0.93}[vehicle.name]
     rise_m = top_m - waist_m
@@ -217,7 +211,6 @@ def _draw_cabin(
 
 
 def _draw_truck(drawing: _Drawing, vehicle: Vehicle, *, paint: Colour, rng: np.random.Generator) -> None:
-    """The rear of a box truck: doors with hinges and lettering, underrun bar, tyres."""
     width_m, half = vehicle.width_m, vehicle.width_m / 2
     for side in (-1, 1):
         drawing.rectangle(
