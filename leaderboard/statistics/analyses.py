@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Collection, Mapping
 from datetime import datetime
 from typing import Any
+from uuid import UUID
 
 import numpy as np
 from django.contrib.auth.models import AnonymousUser
@@ -15,7 +16,7 @@ import evaluator
 from evaluator.metrics.protocol import PRIMARY, Protocol
 from evaluator.scoring import uncertainty
 from evaluator.scoring.breakdown import CURVE_EDGES_S
-from leaderboard.models import Analysis, Evaluation, Split, Status, Submission, User
+from leaderboard.models import Analysis, Edition, Evaluation, Split, Status, Submission, User
 from leaderboard.sandbox import file_values
 from leaderboard.storage import hidden_marks, truth_values
 
@@ -36,6 +37,17 @@ def for_submission(*, submission: Submission, viewer: User | AnonymousUser) -> A
     return Analysis.objects.filter(
         evaluation__submission=submission, evaluation__edition=split.current_edition_id
     ).first()
+
+
+def curves(*, edition: Edition, evaluations: Collection[UUID]) -> dict[UUID, list[dict[str, Any]]]:
+    """The mean errors by true time to contact of evaluations of an open board, where a worker made them.
+
+    Means over whole bins, of methods that their board shows: no value of a sequence. Never of a hidden split.
+    """
+    if edition.split.is_hidden or edition.pk != edition.split.current_edition_id:
+        return {}
+    rows = Analysis.objects.filter(evaluation__edition=edition, evaluation__in=evaluations)
+    return dict(rows.values_list("evaluation_id", "content__curve"))
 
 
 # --- a worker's work -------------------------------------------------------------------------------------

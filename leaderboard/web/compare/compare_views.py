@@ -12,9 +12,10 @@ from leaderboard.boards.snapshots import splits_of
 from leaderboard.http_caching import cacheable
 from leaderboard.models import Split
 from leaderboard.ops import rate_limits
-from leaderboard.statistics import comparisons, questions
+from leaderboard.statistics import analyses, comparisons, questions
 from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.compare import compare_tables
+from leaderboard.web.compare.contact_lens import contact_lens
 
 UNKNOWN, BAD_REQUEST, TOO_MANY = 404, 400, 429
 # What the page offers to choose from; the board itself offers all.
@@ -60,7 +61,9 @@ def _drawn(request: HttpRequest, compared: comparisons.Compared) -> HttpResponse
     attempts = snapshots.shown(split=compared.split, edition=compared.edition).attempts
     n_tried = Counter(attempt.method_id for attempt in attempts)
     page = compare_tables.comparison(compared, n_tried=n_tried)
-    context = {"page": page, "board_split": compared.split.pk}
+    ids = [entry.evaluation_id for entry in compared.entries if entry.evaluation_id]
+    lens = contact_lens(compared.entries, analyses.curves(edition=compared.edition, evaluations=ids))
+    context = {"page": page, "board_split": compared.split.pk, "lens": lens}
     return render(request, "compare/compare.html", context)
 
 
