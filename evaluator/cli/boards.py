@@ -14,7 +14,7 @@ from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name, units, width_of
 from evaluator.cli.options import default_option, json_option, sendable, slug, url_option
 from evaluator.cli.values import authors_or_team, overall_of, texts_of
-from evaluator.metrics.protocol import PRIMARY, known_names
+from evaluator.metrics.protocol import known_names, primary_of
 from evaluator.tables import layouts
 from evaluator.tables.formats import FORMATS
 
@@ -146,7 +146,7 @@ def _table(board: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list
     rows = [[Cell(text, is_bold=True) for text in headings]]
     marks = {name: _marks_of(board, name) for name in scores}
     for i, entry in enumerate(board.entries):
-        ranks = entry.interval(PRIMARY)
+        ranks = entry.interval(primary_of(entry.scores))
         mark = layouts.mark_of(visibility=entry.visibility, pseudonym=entry.pseudonym)
         row = [
             Cell(layouts.rank_text(entry.rank, low=ranks.rank_low, high=ranks.rank_high)),

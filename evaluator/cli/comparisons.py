@@ -17,7 +17,7 @@ from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name,
 from evaluator.cli.options import default_option, json_option, sendable, slug, unit_option, url_option
 from evaluator.cli.reading import TABLE, naming, predictions_of, units_asked
 from evaluator.cli.tokens import has_token
-from evaluator.metrics.protocol import PRIMARY
+from evaluator.metrics.protocol import primary_of
 from evaluator.scoring.significance import Difference
 from evaluator.tables.sentences import influence, others, p_cell, sentence
 from evaluator.units import in_words
@@ -109,7 +109,7 @@ def _server_s_words(
     if pair_sentence or comparison.reason:
         yield ""
         yield printable(pair_sentence or comparison.reason)
-    yield from filter(None, (others(comparison.differences()),))
+    yield from filter(None, (others(comparison.differences(), primary=primary_of(scores[0])),))
 
 
 def _compare_files(first: Path, second: Path, truth_path: Path, *, unit: str | None, as_json: bool) -> None:
@@ -151,11 +151,12 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, unit: str | N
     if any(gap.low is not None for gap in differences.values()):
         click.echo(f"95 % confidence intervals and p-values over {taken}")
     names = str(first), str(second)
-    if PRIMARY in differences:
-        click.echo(printable(sentence(*names, name=PRIMARY, difference=differences[PRIMARY])))
-        if rests_on := influence(*names, difference=differences[PRIMARY]):
+    primary = primary_of(reports[0].flat())
+    if primary in differences:
+        click.echo(printable(sentence(*names, name=primary, difference=differences[primary])))
+        if rests_on := influence(*names, difference=differences[primary]):
             click.echo(printable(rests_on))
-    if lead := others(differences):
+    if lead := others(differences, primary=primary):
         click.echo(lead)
 
 

@@ -13,7 +13,7 @@ import click
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import printable, short_name
-from evaluator.metrics.protocol import PRIMARY, known_names
+from evaluator.metrics.protocol import known_names, metric_of, primary_of, primary_value
 
 if TYPE_CHECKING:
     from evaluator.client.answers import Board, BoardEntry
@@ -70,8 +70,11 @@ def _condition(text: str) -> Condition:
         shown = text.strip() or "nothing"
         joined = "; several are joined by or" if " and " in text else ""
         raise ValueError(f"found {shown!r}, expected NAME OPERATOR NUMBER, such as mid > 15.0{joined}")
-    # As tables write them, too: MiD, MiD_c.
-    called = {spelt.lower(): name for name in known_names() for spelt in (short_name(name), name)}
+    # As tables write them, too: MiD, MiD_c. Of two protocols with one spelling, the first keeps it.
+    spellings = [(name, name) for name in known_names()]
+    called: dict[str, str] = {}
+    for spelt, meant in (*spellings, *((short_name(name), name) for name in known_names())):
+        called.setdefault(spelt.lower(), meant)
     name = called.get(match["name"].lower())
     if name is None:
         raise ValueError(f"found {match['name']!r}, expected one of {', '.join(known_names())}")
@@ -173,16 +176,19 @@ def rival(client: Client, *, split: str, method: str, own: str) -> BoardEntry | 
         click.echo(words, err=True)
         return None
     entry = named(board, method)
-    if entry.scores.get(PRIMARY) is None:
-        raise undecided(f"{printable(entry.method)} has no MiD on {split}")
+    if primary_value(entry.scores) is None:
+        symbol = metric_of(primary_of(entry.scores)).symbol
+        raise undecided(f"{printable(entry.method)} has no {symbol} on {split}")
     return entry
 
 
-def judge_against(entry: BoardEntry, *, mid: float | None, decimals: int = 2) -> None:
-    other = entry.scores[PRIMARY]
-    if mid is None or other is None:
-        raise undecided("there is no value for mid")
-    if mid > other:
+def judge_against(entry: BoardEntry, *, scores: Scores | None, decimals: int = 2) -> None:
+    primary, other = primary_of(entry.scores), primary_value(entry.scores)
+    value = (scores or {}).get(primary)
+    if value is None or other is None:
+        raise undecided(f"there is no value for {primary}")
+    if value > other:
         name = printable(entry.method)
-        words = f"MiD is {mid:.{decimals}f}, and {name} has {other:.{entry.decimals}f}"
+        symbol = metric_of(primary).symbol
+        words = f"{symbol} is {value:.{decimals}f}, and {name} has {other:.{entry.decimals}f}"
         raise Failure(f"The gate fails: {words}.", exit_code=Exit.GATE, code="gate-failed")

@@ -17,7 +17,7 @@ from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name
 from evaluator.cli.options import default_option, json_option, output_option, sendable, slug, url_option
 from evaluator.cli.reading import write_bytes
 from evaluator.cli.values import state_in_words
-from evaluator.metrics.protocol import PRIMARY
+from evaluator.metrics.protocol import metric_of, primary_of, primary_value
 
 if TYPE_CHECKING:
     from evaluator.client.answers import Submission
@@ -90,7 +90,7 @@ def methods(*, url: str, as_json: bool) -> None:
 @url_option
 @json_option
 def list_submissions(*, split: str | None, method: str | None, limit: int, url: str, as_json: bool) -> None:
-    """List the submissions of your team: id, time, split, method, state and MiD.
+    """List the submissions of your team: id, time, split, method, state and the score that ranks.
 
     \b
     Examples:
@@ -119,17 +119,20 @@ def list_submissions(*, split: str | None, method: str | None, limit: int, url: 
 def _table(submissions: Sequence[Submission]) -> list[str]:
     from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
-    heads = ("id", "submitted", "split", "method", "state", short_name(PRIMARY))
+    ranking = dict.fromkeys(primary_of(each.scores) for each in submissions if each.scores)
+    heads = ("id", "submitted", "split", "method", "state", ", ".join(map(short_name, ranking)) or "score")
     table = [[Cell(text, is_bold=True) for text in heads]]
     for each in submissions:
-        mid = (each.scores or {}).get(PRIMARY)
+        value = format_rounded(primary_value(each.scores), decimals=each.decimals, missing=NO_VALUE)
+        if each.scores and len(ranking) > 1:  # of boards that rank by different metrics
+            value = f"{metric_of(primary_of(each.scores)).symbol} {value}"
         texts = (
             each.id,
             str(each.document.get("submitted_at", ""))[:16].replace("T", " "),
             each.split,
             each.method,
             state_in_words(each),
-            format_rounded(mid, decimals=each.decimals, missing=NO_VALUE),
+            value,
         )
         table.append([Cell(printable(text)) for text in texts])
     return aligned(table, align="<<<<<.")

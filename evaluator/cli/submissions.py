@@ -28,7 +28,6 @@ from evaluator.cli.options import (
 from evaluator.cli.reading import name_of, predictions_of
 from evaluator.cli.values import in_short, state_in_words
 from evaluator.cli.warnings_in_words import echo_warnings
-from evaluator.metrics.protocol import PRIMARY
 from evaluator.problems import Rejected, n_problems_in_words
 
 if TYPE_CHECKING:
@@ -62,7 +61,7 @@ if TYPE_CHECKING:
     "--fail-if-worse-than",
     "worse_than",
     metavar="METHOD",
-    help="Exit with code 6 if MiD is higher than that of this method on the board.",
+    help="Exit with code 6 if the score that ranks is worse than that of this method on the board.",
 )
 @click.option("--yes", is_flag=True, help="Do not ask before the results of a public method go public.")
 @click.option("--no-check", is_flag=True, help="Submit without checking the file first.")
@@ -126,8 +125,7 @@ def submit(
         def judge() -> None:
             gates.judge(fail_if, submission.scores, decimals=submission.decimals)
             if rival is not None:
-                mid = (submission.scores or {}).get(PRIMARY)
-                gates.judge_against(rival, mid=mid, decimals=submission.decimals)
+                gates.judge_against(rival, scores=submission.scores, decimals=submission.decimals)
 
         conclude(submission, as_json=as_json, judge=judge, warned=warned)
         if submission.is_new and submission.visibility == "PRIVATE" and not as_json:

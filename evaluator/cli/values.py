@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from evaluator.cli.layout import printable
-from evaluator.metrics.protocol import OVERALL, PRIMARY, metric_of, split_name
+from evaluator.metrics.protocol import OVERALL, metric_of, primary_of, split_name
 from evaluator.tables import layouts
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def state_in_words(submission: Submission) -> str:
 
 def in_short(submission: Submission) -> Iterator[str]:
     if submission.rank is not None:
-        interval = submission.intervals.get(PRIMARY)
+        interval = submission.intervals.get(primary_of(submission.scores or {}))
         low, high = (interval.rank_low, interval.rank_high) if interval else (None, None)
         would_be = "if published: " if submission.visibility == "PRIVATE" else ""
         rank = layouts.rank_text(submission.rank, low=low, high=high)

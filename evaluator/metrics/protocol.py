@@ -4,30 +4,42 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from evaluator.metrics.registry import MID, RTE, Metric
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from evaluator.metrics.scale import Floats
+
 OVERALL: Final = "overall"
 """The name of the mean over all sequences, which is in no range."""
-
-PRIMARY: Final = "mid"
-"""The score that boards rank by: every protocol has it first."""
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9]*")
 
 
 @dataclass(frozen=True, slots=True)
 class TTCRange:
-    """A TTC range: true times to contact in seconds, closed at both ends."""
+    """A TTC range: true times to contact in seconds; an end belongs to it unless it is open."""
 
     name: str
     low_s: float
     high_s: float
+    is_low_open: bool = False
+    is_high_open: bool = False
+
+    def contains(self, ttc_s: Floats) -> NDArray[np.bool_]:
+        """Whether each of these times lies in it: bool of the same shape."""
+        above = ttc_s > self.low_s if self.is_low_open else ttc_s >= self.low_s
+        return above & (ttc_s < self.high_s if self.is_high_open else ttc_s <= self.high_s)
 
     @property
     def letter(self) -> str:
@@ -36,12 +48,31 @@ class TTCRange:
 
     @property
     def ends(self) -> str:
-        """Both ends, without their unit.
+        """Both ends, without their unit; brackets where one is open.
 
-        >>> [ttc_range.ends for ttc_range in TTC_RANGES]
-        ['0–3', '3–6', '6–20', '−20–0']
+        >>> [ttc_range.ends for ttc_range in (*TTC_RANGES, TTCRange("near", 0, 3, is_high_open=True))]
+        ['0–3', '3–6', '6–20', '−20–0', '[0, 3)']
         """
-        return f"{self.low_s:g}–{self.high_s:g}".replace("-", "−")
+        low, high = (f"{end:g}".replace("-", "−") for end in (self.low_s, self.high_s))
+        if not (self.is_low_open or self.is_high_open):
+            return f"{low}–{high}"
+        return f"{'[('[self.is_low_open]}{low}, {high}{'])'[self.is_high_open]}"
+
+    @property
+    def closed_ends(self) -> tuple[float, ...]:
+        """The ends that belong to it, in seconds."""
+        ends = ((self.low_s, self.is_low_open), (self.high_s, self.is_high_open))
+        return tuple(end for end, is_open in ends if not is_open)
+
+    @property
+    def condition(self) -> str:
+        """What holds of the true time to contact τ of its sequences.
+
+        >>> TTC_RANGES[0].condition
+        '0 s ≤ τ ≤ 3 s'
+        """
+        low, high = "≤<"[self.is_low_open], "≤<"[self.is_high_open]
+        return f"{self.low_s:g} s {low} τ {high} {self.high_s:g} s"
 
     @property
     def seconds(self) -> str:
@@ -83,8 +114,8 @@ class Protocol:
 
     Predictions are truncated to [−limit_s, limit_s]. With `near_zero_s = (low, high)`, those in (low, 0)
     become `low` and those in (0, high) become `high`; with None, those without a defined MiD are rejected.
-    NaN and 0 are always rejected. Each of `metrics` has a score overall and in each of `ranges`; the first
-    metric is MiD.
+    NaN and 0 are always rejected. Each of `metrics` has a score overall and in each of `ranges`; boards rank
+    by the overall score of the first metric.
     """
 
     # A metric or range has the same meaning in every protocol that names it.
@@ -96,11 +127,13 @@ class Protocol:
     metrics: tuple[Metric, ...] = (MID, RTE)
 
     def __post_init__(self) -> None:
-        names = [*self.overall_names, *(ttc_range.name for ttc_range in self.ranges)]
-        if not all(map(_NAME.fullmatch, names)) or len({*names, OVERALL}) <= len(names):
-            raise ValueError(f"Names of metrics and TTC ranges are words, each once; found {names}.")
-        if names[0] != PRIMARY:
-            raise ValueError(f"The first metric is {names[0]!r}; expected {PRIMARY!r}, which boards rank by.")
+        fault = next(_contradictions(self), None)
+        if fault is not None:
+            raise ValueError(f"Protocol {self.name!r}: {fault}.")
+
+    @property
+    def primary(self) -> Metric:
+        return self.metrics[0]
 
     @property
     def boundaries(self) -> dict[str, float]:
@@ -133,18 +166,77 @@ class Protocol:
         return max(metric.decimals for metric in self.metrics)
 
 
-PROTOCOLS: Final[dict[str, Protocol]] = {
-    protocol.name: protocol
-    for protocol in (
-        Protocol(name="tsttc-1", limit_s=20.0, near_zero_s=(-0.15, 0.05)),
-        Protocol(name="toolkit", limit_s=20.0, near_zero_s=None),
-    )
-}
+def _contradictions(protocol: Protocol) -> Iterator[str]:
+    """What is wrong with a protocol, each with the two places that contradict each other."""
+    if not protocol.metrics:
+        yield "it has no metric; expected at least one, the first of which ranks"
+    if not 0 < protocol.limit_s < math.inf:
+        yield f"its limit is {protocol.limit_s:g} s; expected one above 0 s"
+    low_s, high_s = protocol.near_zero_s or (-math.inf, math.inf)
+    if protocol.near_zero_s and not -protocol.limit_s < low_s < 0 < high_s < protocol.limit_s:
+        yield (
+            f"near 0 it truncates to {low_s:g} s and {high_s:g} s, and its limit is {protocol.limit_s:g} s; "
+            "expected the one between minus the limit and 0 s, the other between 0 s and the limit"
+        )
+    for ttc_range in protocol.ranges:
+        if not ttc_range.low_s < ttc_range.high_s:
+            yield (
+                f"the TTC range {ttc_range.name!r} begins at {ttc_range.low_s:g} s and ends at "
+                f"{ttc_range.high_s:g} s; expected a later end"
+            )
+    yield from _faulty_names(protocol)
+
+
+def _faulty_names(protocol: Protocol) -> Iterator[str]:
+    """Names that scores cannot have, and what has the name, symbol or letter of something else."""
+    metrics = [(f"metric {each.symbol}", each.name) for each in protocol.metrics]
+    ranges = [(f"TTC range {each.seconds}", each.name) for each in protocol.ranges]
+    for what, name in (*metrics, *ranges):
+        if not _NAME.fullmatch(name) or name == OVERALL:
+            yield f"the {what} is called {name!r}; expected lower-case letters and digits, not {OVERALL!r}"
+    symbols = [(f"metric {each.name}", each.symbol) for each in protocol.metrics]
+    letters = [(f"TTC range {each.name} ({each.seconds})", each.name[:1]) for each in protocol.ranges]
+    for kind, named in (
+        ("are called", [*metrics, *ranges]),
+        ("are called", symbols),
+        ("begin with the letter", letters),
+    ):
+        for (one, name), (other, same) in itertools.combinations(named, 2):
+            if name == same:
+                yield f"the {one} and the {other} both {kind} {name!r}; expected different ones"
+
+
+def registered(*protocols: Protocol) -> dict[str, Protocol]:
+    """These protocols by their names; raises `ValueError` where one name has two meanings."""
+    by_name: dict[str, Protocol] = {}
+    meanings: dict[str, tuple[TTCRange | Metric, str, str]] = {}
+    for protocol in protocols:
+        if protocol.name in by_name:
+            raise ValueError(f"Two protocols are called {protocol.name!r}; expected different names.")
+        by_name[protocol.name] = protocol
+        parts: list[tuple[TTCRange | Metric, str]] = [
+            *((each, f"the TTC range {each.seconds}") for each in protocol.ranges),
+            *((each, f"the metric {each.title} ({each.symbol})") for each in protocol.metrics),
+        ]
+        for part, words in parts:
+            first, first_words, owner = meanings.setdefault(part.name, (part, words, protocol.name))
+            if first != part:
+                raise ValueError(
+                    f"{part.name!r} is {first_words} in protocol {owner!r} and {words} in protocol "
+                    f"{protocol.name!r}; expected one meaning of a name in all protocols."
+                )
+    return by_name
+
+
+PROTOCOLS: Final[dict[str, Protocol]] = registered(
+    Protocol(name="tsttc-1", limit_s=20.0, near_zero_s=(-0.15, 0.05)),
+    Protocol(name="toolkit", limit_s=20.0, near_zero_s=None),
+)
 
 DEFAULT_PROTOCOL: Final = "tsttc-1"
 
 SCORE_NAMES: Final = PROTOCOLS[DEFAULT_PROTOCOL].score_names
-"""The ten numbers of the default protocol; of an edition, ask its own."""
+"""The scores of the default protocol; of an edition, ask its own."""
 
 
 def get_protocol(name: str) -> Protocol:
@@ -160,6 +252,20 @@ def get_protocol(name: str) -> Protocol:
 
 
 # --- what names mean --------------------------------------------------------------------------------------
+
+
+def primary_of(scores: Iterable[str]) -> str:
+    """The score that ranks, of all names of an edition's scores in its protocol's order; "" of none.
+
+    >>> primary_of(["rte", "rte_crucial", "mid"])
+    'rte'
+    """
+    return next(iter(scores), "")
+
+
+def primary_value(scores: Mapping[str, float | None] | None) -> float | None:
+    """The value that ranks; None without scores."""
+    return next(iter(scores.values()), None) if scores else None
 
 
 def metric_of(name: str) -> Metric:

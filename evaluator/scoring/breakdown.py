@@ -60,7 +60,7 @@ def scores_of(
     manifest, ttc_s, errors = details.truth.manifest, details.truth.ttc_s, details.errors
     masks = {OVERALL: np.ones(len(ttc_s), dtype=bool)}
     for ttc_range in details.protocol.ranges if has_ranges else ():
-        masks[ttc_range.name] = (ttc_s >= ttc_range.low_s) & (ttc_s <= ttc_range.high_s)
+        masks[ttc_range.name] = ttc_range.contains(ttc_s)
     names = [score_name(metric, name) for metric in errors for name in masks]
     group_means = []
     sums, counts = list[Floats](), list[Floats]()
@@ -134,7 +134,7 @@ def _by_range(details: Details) -> dict[str, Rows]:
     ttc_s, left = details.truth.ttc_s, np.ones(details.truth.n_sequences, dtype=bool)
     groups = {}
     for ttc_range in details.protocol.ranges:
-        inside = (ttc_s >= ttc_range.low_s) & (ttc_s <= ttc_range.high_s)  # both ends, as in the scores
+        inside = ttc_range.contains(ttc_s)
         groups[f"{ttc_range.name} {ttc_range.seconds}"] = np.flatnonzero(inside)
         left &= ~inside
     return groups | {"in no range": np.flatnonzero(left)}

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PRIMARY, Protocol, get_protocol
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol, primary_of
 from evaluator.metrics.scale import Floats
 from evaluator.predictions.loading import Predictions
 from evaluator.scoring.results import rounded
@@ -174,13 +174,16 @@ def with_influence(
     names: Sequence[str],
     rng: np.random.Generator,
 ) -> dict[str, Difference]:
-    """Add to `compared` the influence on overall MiD, if it has a p; sums and counts are (units, columns)."""
-    overall = compared.get(PRIMARY)
+    """Add the influence on the difference in the first column, the one that ranks, if that has a p.
+
+    Sums and counts are (units, columns).
+    """
+    primary = primary_of(names)
+    overall = compared.get(primary)
     if overall is None or overall.p_below is None:
         return dict(compared)
-    column = list(names).index(PRIMARY)
-    rests_on = influence(differences[:, column], counts[:, column], rng=rng)
-    return {**compared, PRIMARY: replace(overall, influence=rests_on)}
+    rests_on = influence(differences[:, 0], counts[:, 0], rng=rng)
+    return {**compared, primary: replace(overall, influence=rests_on)}
 
 
 def _first_false(holds: Callable[[int], bool], last: int) -> int:

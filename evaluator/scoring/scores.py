@@ -7,7 +7,7 @@ predicted τ̂ (truncated by the protocol), in float64:
     MiD    = |ln α₁₀(τ) − ln α₁₀(τ̂)| · 10⁴
     RTE    = |(τ̂ − τ) / τ| · 100 %
 
-A score is the mean of an error over a closed range of the *true* τ; `overall` is the mean over all sequences,
+A score is the mean of an error over a range of the *true* τ; `overall` is the mean over all sequences,
 also beyond ±20 s. `tsttc-1` truncates τ̂ to [−20, −0.15] ∪ [0.05, 20], by sign, so that α₁₀(τ̂) is within
 [1/3, 3]. `toolkit` truncates to [−20, 20] and refuses τ̂ whose α₁₀ is not positive and finite, where the
 dataset's toolkit crashes. Both refuse 0 and NaN, and truncate ±∞ to ±20.
@@ -33,7 +33,7 @@ from evaluator.metrics.protocol import (
     metric_of,
     split_name,
 )
-from evaluator.metrics.registry import Terms
+from evaluator.metrics.registry import MID, Terms
 from evaluator.metrics.scale import Floats, scale_ratio_10hz
 from evaluator.predictions.loading import Predictions
 from evaluator.predictions.revisions import realigned
@@ -76,8 +76,8 @@ class Scorer:
         self._n_out_of_range = truth.n_outside(protocol.ranges)
         self._slices = {OVERALL: slice(0, len(tau))} | {
             i.name: slice(
-                int(np.searchsorted(tau, i.low_s, side="left")),
-                int(np.searchsorted(tau, i.high_s, side="right")),
+                int(np.searchsorted(tau, i.low_s, side="right" if i.is_low_open else "left")),
+                int(np.searchsorted(tau, i.high_s, side="left" if i.is_high_open else "right")),
             )
             for i in protocol.ranges
         }
@@ -152,11 +152,18 @@ class Scorer:
         alpha = scale_ratio_10hz(predicted)
         # Values that no file may hold may still come from arrays.
         is_allowed = allowed(predictions.ttc_s, unit="ttc").all()
-        if not (is_allowed and alpha.min() > 0.0 and alpha.max() < np.inf):
+        if not (is_allowed and _defined(alpha, self._protocol).all()):
             _refuse(predictions, self._protocol)
         terms = Terms(predicted, truth.ascending_ttc_s, alpha, true_log)
         errors = {metric.name: metric.function(terms) for metric in self._protocol.metrics}
         return errors, n_truncated
+
+
+def _defined(scale_ratio: Floats, protocol: Protocol) -> NDArray[np.bool_]:
+    """Whether each scale ratio has an error in every metric of the protocol: only MiD lacks some."""
+    if MID not in protocol.metrics:
+        return np.ones(scale_ratio.shape, dtype=bool)
+    return np.asarray((scale_ratio > 0.0) & (scale_ratio < np.inf))
 
 
 def _truncate(ttc_s: Floats, protocol: Protocol) -> tuple[Floats, tuple[int, ...]]:
@@ -177,7 +184,7 @@ def _refuse(predictions: Predictions, protocol: Protocol) -> NoReturn:
     findings = Findings()
     ttc_s, _ = _truncate(predictions.ttc_s, protocol)
     alpha = scale_ratio_10hz(ttc_s)
-    is_good = allowed(predictions.ttc_s, unit="ttc") & (alpha > 0.0) & (alpha < np.inf)
+    is_good = allowed(predictions.ttc_s, unit="ttc") & _defined(alpha, protocol)
     for row in np.flatnonzero(~is_good).tolist():
         value, where = predictions.ttc_s[row], predictions.where(row)
         if rule := broken_rule(value, unit="ttc"):

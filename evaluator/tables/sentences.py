@@ -7,7 +7,7 @@ from statistics import median
 from typing import Final
 
 from evaluator.counting import counted
-from evaluator.metrics.protocol import PRIMARY, column_words, metric_of
+from evaluator.metrics.protocol import column_words, metric_of
 from evaluator.scoring.significance import SIGNIFICANT, Difference, best_of, too_few_units
 from evaluator.units import in_words
 
@@ -186,16 +186,16 @@ def resolution(pairs: Sequence[Mapping[str, Difference]], *, decimals: int = 2) 
     )
 
 
-def others(differences: Mapping[str, Difference]) -> str:
-    """Count the columns besides overall MiD that differ significantly; empty if no column has a p.
+def others(differences: Mapping[str, Difference], *, primary: str) -> str:
+    """Count the columns besides `primary` that differ significantly; empty if no column has a p.
 
     >>> alike, far = Difference(0.1, -0.2, 0.4, 0.5), Difference(-4.1, -5.3, -2.9, 0.0003)
-    >>> others({"mid": far, "mid_small": alike, "rte": alike})
+    >>> others({"mid": far, "mid_small": alike, "rte": alike}, primary="mid")
     'None of the 2 other metrics differs significantly (α = 0.05, uncorrected).'
-    >>> others({"mid": alike, "mid_small": far, "rte": alike})
+    >>> others({"mid": alike, "mid_small": far, "rte": alike}, primary="mid")
     '1 of the 2 other metrics differs significantly (α = 0.05, uncorrected).'
     """
-    tested = [name for name, gap in differences.items() if name != PRIMARY and gap.p_below is not None]
+    tested = [name for name, gap in differences.items() if name != primary and gap.p_below is not None]
     if not tested:
         return ""
     n_different = sum(differences[name].is_significant for name in tested)

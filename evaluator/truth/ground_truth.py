@@ -231,13 +231,13 @@ class GroundTruth:
         """ln α₁₀(τ) in ascending τ, the truth's part of every MiD."""
         return exact_log(scale_ratio_10hz(self.ascending_ttc_s))
 
-    def counts_of(self, intervals: Iterable[TTCRange]) -> dict[str, int]:
+    def counts_of(self, ranges: Iterable[TTCRange]) -> dict[str, int]:
         """Count the sequences of each TTC range by name; a shared end counts twice."""
-        return {i.name: int(np.count_nonzero(_inside(self.ttc_s, i.low_s, i.high_s))) for i in intervals}
+        return {each.name: int(np.count_nonzero(each.contains(self.ttc_s))) for each in ranges}
 
-    def n_outside(self, intervals: Iterable[TTCRange]) -> int:
+    def n_outside(self, ranges: Iterable[TTCRange]) -> int:
         """Count the sequences outside of these TTC ranges."""
-        inside = [_inside(self.ttc_s, i.low_s, i.high_s) for i in intervals]
+        inside = [each.contains(self.ttc_s) for each in ranges]
         return self.n_sequences - int(np.count_nonzero(np.logical_or.reduce(inside)))
 
     def to_table(self) -> Table:
@@ -295,10 +295,6 @@ def _table_of(source: Source, *, with_ttc: bool) -> Table:
     return read_csv(source, with_ttc=with_ttc)
 
 
-def _inside(ttc_s: Floats, low_s: float, high_s: float) -> NDArray[np.bool_]:
-    return (ttc_s >= low_s) & (ttc_s <= high_s)
-
-
 def _check_values(ttc_s: Floats, table: Table) -> None:
     findings = Findings()
     finite = np.isfinite(ttc_s)
@@ -306,7 +302,8 @@ def _check_values(ttc_s: Floats, table: Table) -> None:
         findings.add("truth-not-finite", f"ttc is {ttc_s[row]}; expected a finite number.", table.where(row))
     alpha = scale_ratio_10hz(ttc_s)
     # The last two conditions only keep the arithmetic finite; no real value comes near them.
-    undefined = _inside(ttc_s, -0.1, 0.0) | ~(np.isfinite(alpha) & (alpha > 0)) | (np.abs(ttc_s) < 1e-200)
+    near = (ttc_s >= -0.1) & (ttc_s <= 0.0)
+    undefined = near | ~(np.isfinite(alpha) & (alpha > 0)) | (np.abs(ttc_s) < 1e-200)
     for row in np.flatnonzero(finite & undefined).tolist():
         message = (
             f"ttc is {ttc_s[row]!s}, where the errors are undefined; expected ttc >= 1e-200 or ttc < -0.1."

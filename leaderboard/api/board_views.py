@@ -65,7 +65,7 @@ class BoardView(APIView):
         responses={200: BoardSerializer, **errors(400, 404)},
     )
     def get(self, request: Request, split: str) -> Response:
-        """Submissions and quoted rows, ranked by published MiD; filters do not change the ranks."""
+        """Submissions and quoted rows, ranked by the first of the scores; filters do not change the ranks."""
         query = request.query_params
         at = listing.parse_time(query["at"]) if query.get("at") else None
         return _board(request, split=current_split(request, split), at=at)

@@ -102,7 +102,7 @@ class PairSerializer(serializers.Serializer[Pair]):
         help_text="First minus second, by score name; null until computed."
     )
     sentence = serializers.SerializerMethodField(
-        help_text="The difference in MiD as a sentence; empty until computed."
+        help_text="The difference in the score that ranks as a sentence; empty until computed."
     )
     withheld = serializers.CharField(
         allow_blank=True,

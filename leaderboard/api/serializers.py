@@ -48,7 +48,7 @@ NULLABLE: Final[dict[str, Any]] = {"default": None, "allow_null": True}
 
 
 class NamedSerializer(serializers.Serializer[Any]):
-    """Values by the names of scores that an edition has by its protocol; required are those of every one."""
+    """Values by the names that an edition's protocol has, in its order; required are those of every one."""
 
     known = staticmethod(known_names)
 
@@ -64,20 +64,19 @@ class NamedSerializer(serializers.Serializer[Any]):
         return {name: self.child(name, required=name in common) for name in self.known()}
 
     def to_representation(self, instance: Mapping[str, Any]) -> dict[str, Any]:
-        # In the order of the fields.
         return {
-            name: None if instance[name] is None else field.to_representation(instance[name])
-            for name, field in self.fields.items()
-            if name in instance
+            name: None if value is None else self.fields[name].to_representation(value)
+            for name, value in instance.items()
+            if name in self.fields
         }
 
 
 def _sequences(ttc_range: TTCRange | None) -> str:
-    return f"those with {ttc_range.low_s:g} s ≤ τ ≤ {ttc_range.high_s:g} s" if ttc_range else "all sequences"
+    return f"those with {ttc_range.condition}" if ttc_range else "all sequences"
 
 
 class ScoresSerializer(NamedSerializer):
-    """The published scores: MiD in 10⁻⁴, RTE in percent."""
+    """The published scores of the protocol; the board ranks by the first."""
 
     def child(self, name: str, **options: Any) -> serializers.FloatField:
         metric, of = metric_of(name), _sequences(range_of(name))
@@ -283,7 +282,7 @@ class EntrySerializer(serializers.Serializer[Entry]):
     """One row of a board."""
 
     rank = serializers.IntegerField(
-        allow_null=True, help_text="By published MiD, shared by ties; null: no MiD."
+        allow_null=True, help_text="By the first of the published scores, shared by ties; null: it has none."
     )
     id = serializers.CharField(
         help_text="Names this row for good: the method's id, or of a quoted row `published:` and its short "
@@ -320,7 +319,7 @@ class EntrySerializer(serializers.Serializer[Entry]):
         allow_null=True,
         help_text="Scored submissions of the team's public methods to the split; anonymous: of the method.",
     )
-    scores = ScoresSerializer(help_text="The ten published scores.")
+    scores = ScoresSerializer(help_text="The published scores; the board ranks by the first.")
     decimals = serializers.IntegerField(
         help_text="Decimals of the scores and their confidence intervals: as printed in the paper, else as "
         "the edition publishes."
@@ -358,7 +357,6 @@ class BoardSerializer(serializers.Serializer[Board]):
     unit = serializers.CharField(source="edition.unit", help_text=UNIT, **NULLABLE)
     n_units = serializers.IntegerField(source="edition.unit_count", help_text=N_UNITS, **NULLABLE)
     floor = ScoresSerializer(
-        source="edition.floor",
         help_text="Scores of the ground truth itself, submitted as predictions: hardly any file scores "
         "lower, because the protocol truncates predictions and not the ground truth. Null: not computed yet.",
         **NULLABLE,

@@ -74,7 +74,7 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
     note = serializers.CharField(allow_blank=True, help_text="The team's own note.")
     commit = serializers.CharField(allow_blank=True, help_text="Commit of the code that made the file.")
     queue = QueueSerializer(allow_null=True, help_text="Position in the queue; null: not waiting.")
-    scores = ScoresSerializer(allow_null=True, help_text="The ten published scores; null: not scored yet.")
+    scores = ScoresSerializer(allow_null=True, help_text="The published scores; null: not scored yet.")
     decimals = serializers.IntegerField(help_text="Decimals of the scores and confidence intervals.")
     intervals = serializers.DictField(
         child=UncertaintySerializer(),
@@ -88,14 +88,14 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
     rank = serializers.IntegerField(
         allow_null=True,
         help_text="Rank of the method on the current board if this submission is its row there, else null; "
-        "of a private method the rank it would have. Its rank range is that of `intervals.mid`.",
+        "of a private method the rank it would have. Its rank range is that of the first score.",
     )
     counts = CountsSerializer(
         allow_null=True, help_text="Number of sequences behind each mean; null: not scored yet."
     )
     n_out_of_range = serializers.IntegerField(
         allow_null=True,
-        help_text="Sequences in no TTC range (|τ| > 20 s), which only the overall means include.",
+        help_text="Sequences in no TTC range, which only the overall means include.",
     )
     truncated = serializers.DictField(
         child=serializers.IntegerField(), help_text="Number of predictions truncated to each boundary."

@@ -12,7 +12,7 @@ from django.utils import timezone
 from django.utils.dateparse import parse_date, parse_datetime
 
 from evaluator.metrics import registry
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PRIMARY, Protocol, get_protocol, known_names
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol, known_names
 from leaderboard.boards.filters import Filters
 from leaderboard.boards.rows import (
     NO_RANGES,
@@ -97,6 +97,12 @@ class Board:
     def rules(self) -> Protocol:
         return rules_of(self.edition)
 
+    @property
+    def floor(self) -> dict[str, float | None] | None:
+        """Return the scores of the ground truth itself in the protocol's order; None until computed."""
+        floor = self.edition.floor if self.edition else None
+        return {name: floor[name] for name in self.rules.score_names if name in floor} if floor else None
+
 
 def rules_of(edition: Edition | None) -> Protocol:
     """Return the protocol of an edition, or the default one before there is any."""
@@ -129,10 +135,10 @@ def board(
 ) -> Board:
     """Return the board of a split in one edition (default: the published one), as `viewer` may see it.
 
-    `at` is a time in the past; visibility is always as of now. Ranks are by MiD among all public rows,
-    whatever the filters; ties share a rank. A method is represented by the best of its active submissions.
-    Rows that only the viewer's team sees carry the rank that they would have.
-    `read` replaces `public_rows`. Raises `UnknownColumn`.
+    `at` is a time in the past; visibility is always as of now. Ranks are by the protocol's first metric among
+    all public rows, whatever the filters; ties share a rank. A method is represented by the best of its
+    active submissions. Rows that only the viewer's team sees carry the rank that they would have. `read`
+    replaces `public_rows`. Raises `UnknownColumn`.
     """
     edition = edition or (edition_at(split, at) if at else split.current_edition)
     require_column(sort, rules=rules_of(edition))
@@ -248,7 +254,7 @@ def _best_of_each(
             withdrawn_at=withdrawn_at,
             unscorable=unscorable.get(evaluation.submission_id, ""),
         )
-        sort_key = key(entry.scores[PRIMARY], submission.submitted_at)
+        sort_key = key(entry.value, submission.submitted_at)
         rival = best.get(method.pk)
         if rival is None or sort_key < rival[0]:
             best[method.pk] = sort_key, entry
@@ -369,13 +375,13 @@ def _private_rows(
     by_id = {method.pk: method for method in methods.select_related("team")}
     rows = _best_of_each(methods, split=split, edition=edition, at=at)
     attempts = _attempts(methods, split=split, at=at, of_teams=False)
-    public = [entry.scores[PRIMARY] for entry in shown]
+    public = [entry.value for entry in shown]
     return [
         replace(
             unmasked(row, by_id[row.method_id]),
             visibility=Visibility.PRIVATE,
             pseudonym="",
-            rank=registry.rank([*public, row.scores[PRIMARY]])[-1],
+            rank=registry.rank([*public, row.value])[-1],
             n_attempts=attempts.get(row.method_id, 0),
         )
         for row in rows

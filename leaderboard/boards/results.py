@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from django.contrib.auth.models import AnonymousUser
 
-from evaluator.metrics.protocol import PRIMARY
 from leaderboard.boards import listing, snapshots
 from leaderboard.boards.rows import Entry, Profile, profile_of
 from leaderboard.boards.snapshots import Attempt
@@ -57,11 +56,11 @@ def results(
 
 def _neighbours(entry: Entry, rows: Sequence[Entry]) -> tuple[Entry, ...]:
     """The row before and the row after; at an end of the board the two next to it."""
-    value = entry.scores[PRIMARY]
-    others = [row for row in rows if row.method_id != entry.method_id and row.scores[PRIMARY] is not None]
+    value = entry.value
+    others = [row for row in rows if row.method_id != entry.method_id and row.value is not None]
     if value is None:
         return ()
-    others.sort(key=lambda row: row.scores[PRIMARY] or 0.0)
-    n_better = sum((row.scores[PRIMARY] or 0.0) < value for row in others)
+    others.sort(key=lambda row: row.value or 0.0)
+    n_better = sum((row.value or 0.0) < value for row in others)
     first = min(max(n_better - 1, 0), max(len(others) - 2, 0))
     return tuple(others[first : first + 2])

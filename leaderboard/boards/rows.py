@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 from uuid import UUID
 
 from evaluator.metrics import registry
-from evaluator.metrics.protocol import PRIMARY, Protocol, score_name
+from evaluator.metrics.protocol import Protocol, primary_of, primary_value, score_name
 from leaderboard.methods.details import Details, details_of, stated
 from leaderboard.models import (
     Edition,
@@ -101,6 +101,21 @@ class Entry:
     def id(self) -> str:
         """The unique name of the row: a method's id, or `published:` and a slug."""
         return str(self.method_id) if self.method_id else f"published:{self.slug}"
+
+    @property
+    def primary(self) -> str:
+        """The name of the score that ranks."""
+        return primary_of(self.scores)
+
+    @property
+    def value(self) -> float | None:
+        """The score that ranks."""
+        return primary_value(self.scores)
+
+    @property
+    def interval(self) -> ConfidenceInterval:
+        """Where the score that ranks may lie, and its rank."""
+        return self.intervals.get(self.primary, _UNKNOWN)
 
     @property
     def is_unscorable(self) -> bool:
@@ -269,13 +284,13 @@ def ranges_in(edition: Edition) -> KeptRanges:
 
 def placed(entry: Entry, rank: int | None) -> Entry:
     """Give the row its rank; drop a rank range without it, which is of an earlier board."""
-    interval = entry.intervals.get(PRIMARY, ConfidenceInterval())
+    interval = entry.interval
     if rank is None or interval.rank_low is None or interval.rank_high is None:
         return replace(entry, rank=rank)
     if interval.rank_low <= rank <= interval.rank_high:
         return replace(entry, rank=rank)
     unplaced = replace(interval, rank_low=None, rank_high=None)
-    return replace(entry, rank=rank, intervals={**entry.intervals, PRIMARY: unplaced})
+    return replace(entry, rank=rank, intervals={**entry.intervals, entry.primary: unplaced})
 
 
 SortKey = tuple[bool, float, datetime]
@@ -288,7 +303,7 @@ def key(value: float | None, submitted_at: datetime) -> SortKey:
 
 def in_ranks(entries: Sequence[Entry]) -> tuple[Entry, ...]:
     """Rank the rows, and mark the best and the second of each column."""
-    ranks = registry.rank([entry.scores[PRIMARY] for entry in entries])
+    ranks = registry.rank([entry.value for entry in entries])
     names = list(entries[0].scores) if entries else []
     marks = {name: registry.best_and_second([entry.scores[name] for entry in entries]) for name in names}
     return tuple(
@@ -305,7 +320,7 @@ def listed(entries: Sequence[Entry], *, by: str) -> list[Entry]:
     """Sort by one column; rows without a value come last, ties by rank, value and name."""
     column = by.removeprefix("-")
     in_rank_order = sorted(
-        entries, key=lambda e: (e.rank or len(entries) + 1, e.scores[PRIMARY] or 0, e.method.casefold())
+        entries, key=lambda e: (e.rank or len(entries) + 1, e.value or 0, e.method.casefold())
     )
 
     def value(entry: Entry) -> str | float | int | None:

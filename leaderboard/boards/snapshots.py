@@ -18,7 +18,7 @@ from django.db import connection, transaction
 from django.db.models import F, QuerySet
 from django.http import HttpRequest
 
-from evaluator.metrics.protocol import OVERALL
+from evaluator.metrics.protocol import OVERALL, primary_value
 from leaderboard import board_versions
 from leaderboard.boards import listing
 from leaderboard.boards.rows import Entry
@@ -41,6 +41,11 @@ class Attempt:
     submission_id: UUID
     at: datetime
     scores: Mapping[str, float | None]
+
+    @property
+    def value(self) -> float | None:
+        """The score that ranks."""
+        return primary_value(self.scores)
 
 
 @dataclass(frozen=True)

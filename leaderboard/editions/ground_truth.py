@@ -10,7 +10,7 @@ from django.db.models import Max
 
 import evaluator
 from evaluator.counting import counted
-from evaluator.metrics.protocol import OVERALL, TTC_RANGES, get_protocol, known_ranges
+from evaluator.metrics.protocol import OVERALL, PROTOCOLS, get_protocol, known_ranges
 from evaluator.predictions.revisions import Comparison, compare
 from evaluator.units import RECORDING, Units
 from leaderboard import audit, board_versions
@@ -63,7 +63,7 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
         raise Refused("unknown-split", f"There is no split {split_name!r}; expected one of {known}.")
     truth = evaluator.read_truth(path)
     old = split.current_edition.ground_truth if split.current_edition else None
-    counts = _compared(old, truth)
+    counts, n_in_ranges = _compared(old, truth), _counts(truth)
     # Before anything is written: the mark of hidden values would stay on those of an open split.
     _require_own(split, GroundTruth.objects.filter(digest=truth.digest).first())
     truth_values.save(truth, is_hidden=split.is_hidden)
@@ -77,21 +77,29 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
                 "source": path.name[:200],
                 "n_sequences": truth.manifest.n_sequences,
                 "n_recordings": truth.manifest.n_recordings,
-                "counts": {
-                    OVERALL: truth.n_sequences,
-                    **truth.counts_of(known_ranges().values()),
-                    "out_of_range": truth.n_outside(TTC_RANGES),
-                },
+                "counts": n_in_ranges,
                 "imported_at": now,
                 "imported_by": actor,
             },
         )
         _require_own(split, row)
+        if row.counts != n_in_ranges:  # counted before a protocol with other TTC ranges was known
+            row.counts = {**row.counts, **n_in_ranges}
+            row.save(update_fields=["counts"])
         if old is not None and counts is not None:
             _keep_comparison(old, row, counts)
         if is_new:
             audit.record(verb="imported", noun="GroundTruth", noun_id=row.pk, actor=actor)
     return row
+
+
+def _counts(truth: evaluator.GroundTruth) -> dict[str, int]:
+    """Sequences in all, in each TTC range of all protocols, and in none of the ranges of each protocol."""
+    outside = {
+        GroundTruth.out_of_range_key(protocol): truth.n_outside(protocol.ranges)
+        for protocol in PROTOCOLS.values()
+    }
+    return {OVERALL: truth.n_sequences, **truth.counts_of(known_ranges().values()), **outside}
 
 
 def _require_own(split: Split, row: GroundTruth | None) -> None:

@@ -1,9 +1,9 @@
-"""A badge for a README with a method's rank and MiD."""
+"""A badge for a README with a method's rank and score."""
 
 from typing import Final
 from xml.sax.saxutils import escape, quoteattr
 
-from evaluator.metrics.protocol import PRIMARY
+from evaluator.metrics.protocol import metric_of
 from evaluator.scoring.results import format_rounded
 from evaluator.tables.escaping import one_line
 from leaderboard.boards.rows import Entry
@@ -22,10 +22,12 @@ def words(entry: Entry | None) -> str:
         return "no entry"
     if entry.withdrawn_at is not None:
         return "withdrawn"
-    if entry.scores[PRIMARY] is None:
-        return "no MiD"
+    metric = metric_of(entry.primary)
+    if entry.value is None:
+        return f"no {metric.symbol}"
     rank = f"rank {entry.rank}, " if entry.rank is not None else ""
-    return f"{rank}MiD {format_rounded(entry.scores[PRIMARY], decimals=entry.decimals)}"
+    value = format_rounded(entry.value, decimals=entry.decimals)
+    return f"{rank}{metric.symbol} {value}{metric.unit_of_value}"
 
 
 def svg(*, label: str, text: str) -> str:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.results import format_rounded
 from evaluator.tables import layouts
 from evaluator.tables.layouts import Export
@@ -93,7 +92,7 @@ def _origin(board: Board, *, address: str) -> layouts.Origin:
 
 
 def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
-    ranks = entry.intervals.get(PRIMARY, ConfidenceInterval())
+    ranks = entry.interval
     row: dict[str, object] = {
         "rank": entry.rank,
         "rank_low": ranks.rank_low,
@@ -124,7 +123,7 @@ def latex_row(entry: Entry) -> str:
 
 
 def _layout_row(entry: Entry, *, columns: Sequence[str], has_intervals: bool) -> layouts.Row:
-    ranks = entry.intervals.get(PRIMARY, ConfidenceInterval()) if has_intervals else ConfidenceInterval()
+    ranks = entry.interval if has_intervals else ConfidenceInterval()
     return layouts.Row(
         rank=layouts.rank_text(entry.rank, low=ranks.rank_low, high=ranks.rank_high),
         method=entry.method,

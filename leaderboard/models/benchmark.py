@@ -8,7 +8,7 @@ from django.db import connection, models
 from django.db.models import Q
 from django.utils import timezone
 
-from evaluator.metrics.protocol import Protocol, get_protocol
+from evaluator.metrics.protocol import TTC_RANGES, Protocol, get_protocol
 from leaderboard.models.people import User
 from leaderboard.models.quotas import QuotaRules
 from leaderboard.models.units import UnitOfInference
@@ -185,6 +185,11 @@ class GroundTruth(models.Model):
     def short_digest(self) -> str:
         return self.digest.removeprefix("sha256:")[:8]
 
+    @staticmethod
+    def out_of_range_key(rules: Protocol) -> str:
+        """Under what `counts` has the number of sequences in no TTC range of a protocol."""
+        return "out_of_range" if rules.ranges == TTC_RANGES else f"out_of_range_of_{rules.name}"
+
 
 class TruthComparisonQuerySet(models.QuerySet["TruthComparison"]):
     def between(self, one: GroundTruth, other: GroundTruth) -> Self:
@@ -265,6 +270,12 @@ class Edition(UnitOfInference):
     @property
     def rules(self) -> Protocol:
         return get_protocol(self.protocol)
+
+    @property
+    def n_out_of_range(self) -> int | None:
+        """Sequences in no TTC range of its protocol; None where that protocol came after the count."""
+        n: int | None = self.ground_truth.counts.get(GroundTruth.out_of_range_key(self.rules))
+        return n
 
     @property
     def is_in_preparation(self) -> bool:

@@ -13,7 +13,7 @@ from django.db.models import QuerySet
 from numpy.typing import NDArray
 
 import evaluator
-from evaluator.metrics.protocol import PRIMARY, Protocol
+from evaluator.metrics.protocol import Protocol
 from evaluator.scoring import uncertainty
 from evaluator.scoring.breakdown import CURVE_EDGES_S
 from leaderboard.models import Analysis, Edition, Evaluation, Split, Status, Submission, User
@@ -103,10 +103,10 @@ def content_of(
       [low_s, high_s) with sequences; `intervals` are the 95 % intervals `{"mid": [low, high], …}` of means
       with enough units;
     - `distribution`: `{"mid": […], …}`, each a list of `{"quantile", "value"}` from 0.05 to 0.99;
-    - `histogram`: `{"low", "high", "n"}` of MiD over 24 equal bins up to its 95 % quantile; the last has
-      `"high": None`;
+    - `histogram`: `{"low", "high", "n"}` of the ranking metric over 24 equal bins up to its 95 % quantile;
+      the last has `"high": None`;
     - `scatter`: `{"true_s": […], "predicted_s": […]}` of at most 500 random sequences, predictions truncated;
-    - `worst`: at most 20 recordings by mean MiD, worst first: `{"recording", "n", "mid", …}`;
+    - `worst`: at most 20 recordings by mean error in it, worst first: `{"recording", "n", "mid", …}`;
     - `n_sequences` and `n_recordings`.
 
     Errors have the names of the protocol's metrics and are rounded as published; times to a millisecond.
@@ -128,12 +128,12 @@ def content_of(
             ]
             for name, values in errors.items()
         },
-        "histogram": _histogram(errors[PRIMARY], decimals),
+        "histogram": _histogram(errors[rules.primary.name], decimals),
         "scatter": {
             "true_s": np.round(truth.ttc_s[drawn], 3).tolist(),
             "predicted_s": np.round(predicted_s, 3).tolist(),
         },
-        "worst": _worst(truth, errors, decimals),
+        "worst": _worst(truth, errors, decimals, by=rules.primary.name),
     }
 
 
@@ -169,18 +169,20 @@ def _curve(
     ]
 
 
-def _histogram(mid: Floats, decimals: int) -> list[dict[str, float | int | None]]:
-    end = float(np.quantile(mid, 0.95)) or 1.0
+def _histogram(values: Floats, decimals: int) -> list[dict[str, float | int | None]]:
+    end = float(np.quantile(values, 0.95)) or 1.0
     edges = np.linspace(0, end, N_BINS + 1)
-    inside, _ = np.histogram(mid[mid < end], edges)
+    inside, _ = np.histogram(values[values < end], edges)
     rows: list[dict[str, float | int | None]] = [
         {"low": round(low, decimals), "high": round(high, decimals), "n": n}
         for low, high, n in zip(edges[:-1].tolist(), edges[1:].tolist(), inside.tolist(), strict=True)
     ]
-    return [*rows, {"low": round(end, decimals), "high": None, "n": int((mid >= end).sum())}]
+    return [*rows, {"low": round(end, decimals), "high": None, "n": int((values >= end).sum())}]
 
 
-def _worst(truth: evaluator.GroundTruth, errors: Errors, decimals: int) -> list[dict[str, float | int | str]]:
+def _worst(
+    truth: evaluator.GroundTruth, errors: Errors, decimals: int, *, by: str
+) -> list[dict[str, float | int | str]]:
     index, n_bags = truth.manifest.recording_index, truth.manifest.n_recordings
     counts = np.bincount(index, minlength=n_bags)
     means = {
@@ -192,5 +194,5 @@ def _worst(truth: evaluator.GroundTruth, errors: Errors, decimals: int) -> list[
             "n": int(counts[row]),
             **{name: round(float(values[row]), decimals) for name, values in means.items()},
         }
-        for row in np.argsort(-means[PRIMARY], kind="stable")[:MAX_RECORDINGS].tolist()
+        for row in np.argsort(-means[by], kind="stable")[:MAX_RECORDINGS].tolist()
     ]

@@ -13,7 +13,6 @@ from uuid import UUID
 from django.contrib.auth.models import AnonymousUser
 
 from evaluator import Difference
-from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring import differences
 from evaluator.scoring.significance import Influence
 from evaluator.tables import sentences
@@ -69,8 +68,14 @@ class Pair:
     differences: Mapping[str, Difference] | None
     withheld: str = ""
 
-    def sentence(self, name: str = PRIMARY) -> str:
-        """Word the difference in one column; empty while it is not known."""
+    @property
+    def difference(self) -> Difference | None:
+        """Return the difference in the score that ranks; None until a worker has computed it."""
+        return (self.differences or {}).get(self.first.primary)
+
+    def sentence(self, name: str = "") -> str:
+        """Word the difference in a column (default: the one that ranks); empty while it is not known."""
+        name = name or self.first.primary
         if self.differences is None or name not in self.differences:
             return ""
         first, second = self.first.method, self.second.method
@@ -84,13 +89,13 @@ class Pair:
         )
 
     def influence(self) -> str:
-        """Say on how few recordings the difference in MiD rests; empty where that is withheld."""
-        gap = (self.differences or {}).get(PRIMARY)
+        """Say on how few recordings the difference in what ranks rests; empty where that is withheld."""
+        gap = self.difference
         return sentences.influence(self.first.method, self.second.method, difference=gap) if gap else ""
 
     def others(self) -> str:
-        """Say how many columns besides overall MiD differ significantly."""
-        return sentences.others(self.differences or {})
+        """Say how many columns besides the one that ranks differ significantly."""
+        return sentences.others(self.differences or {}, primary=self.first.primary)
 
 
 @dataclass(frozen=True)
@@ -178,7 +183,7 @@ def _chosen(board: listing.Board, methods: Sequence[UUID], viewer: User | Anonym
         )
     if len(set(methods)) < len(methods):
         raise BadComparison("One method is given twice; expected different methods to compare.")
-    entry_of = {entry.method_id: entry for entry in board.entries if entry.scores[PRIMARY] is not None}
+    entry_of = {entry.method_id: entry for entry in board.entries if entry.value is not None}
     for pk in methods:
         if pk not in entry_of:
             if Method.objects.visible_to(viewer).filter(pk=pk).exists():

@@ -20,7 +20,7 @@ from django.db.models.functions import Now
 from numpy.typing import NDArray
 
 from evaluator import rounded
-from evaluator.metrics.protocol import OVERALL, PRIMARY, score_name
+from evaluator.metrics.protocol import OVERALL, score_name
 from evaluator.scoring import uncertainty
 from evaluator.scoring.ranges import Quoted, rank_ranges
 from evaluator.scoring.significance import MIN_DEGREES, cut_off, too_few_units
@@ -58,7 +58,7 @@ class ScoredEntry(NamedTuple):
     file: SentFile
     method_id: UUID
     is_shown: bool
-    value: float  # its MiD, as published
+    value: float  # the score that ranks, as published
     submitted_at: datetime
 
 
@@ -76,7 +76,7 @@ def active_entries(edition: Edition) -> list[ScoredEntry]:
         evaluation__edition=edition,
         evaluation__status=Status.SCORED,
         evaluation__submission__withdrawn_at=None,
-        metric=PRIMARY,
+        metric=edition.rules.primary.name,
         ttc_range=OVERALL,
     ).values_list(
         "evaluation_id",

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from typing import Final
 
-from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.dependence import Dependence, dependence
 from evaluator.units import DAY, GIVEN, RECORDING, Units
 from leaderboard.errors.refusals import Refused
@@ -28,17 +27,16 @@ def groups_of(edition: Edition) -> Units:
 
 
 def checks(edition: Edition, groups: Units) -> Iterator[tuple[str, Dependence | None]]:
-    """Check the MiD of the first methods, best first, and their differences from the best.
+    """Check the ranking score of the first methods, best first, and their differences from the best.
 
     Raises what `recording_sums.sums_of` raises.
     """
-    column = edition.rules.score_names.index(PRIMARY)
-    counts = recording_sums.counts_of(edition)[:, column]
+    counts = recording_sums.counts_of(edition)[:, 0]
     entries = sorted(confidence.ranked(confidence.active_entries(edition)), key=lambda each: each.value)
     names = dict(Method.objects.filter(pk__in=[each.method_id for each in entries]).values_list("pk", "name"))
     best = None
     for entry in entries[:N_FIRST]:
-        sums, name = recording_sums.sums_of(edition, file=entry.file)[:, column], names[entry.method_id]
+        sums, name = recording_sums.sums_of(edition, file=entry.file)[:, 0], names[entry.method_id]
         rng = confidence.generator_of(edition, purpose="units")
         yield name, dependence(sums, counts, groups, rng=rng)
         if best is None:

@@ -8,7 +8,7 @@ from uuid import UUID
 from django.db.models import QuerySet
 
 from evaluator.metrics import registry
-from evaluator.metrics.protocol import OVERALL, PRIMARY
+from evaluator.metrics.protocol import OVERALL, primary_value
 from leaderboard.boards import snapshots
 from leaderboard.boards.rows import ConfidenceInterval, Entry, profile_of, scored_of, submitted_entry
 from leaderboard.boards.snapshots import CurrentBoard
@@ -169,28 +169,31 @@ def _position(
     )
     if submission.pk not in best:
         return position
-    values = [row.scores[PRIMARY] for row in drawn.entries]
-    rank = registry.rank([*values, (progress.scores or {}).get(PRIMARY)])[-1]
+    rank = registry.rank([*(row.value for row in drawn.entries), primary_value(progress.scores)])[-1]
     return replace(position, rank=rank, n_ranked=n_ranked + 1, is_supposed=True)
 
 
 def _best_of(methods: Iterable[UUID], editions: Iterable[Edition]) -> set[UUID]:
     best: dict[tuple[int, UUID], UUID] = {}
-    rows = _entry_in(editions).filter(evaluation__submission__method__in=methods)
-    for edition, method, submission in rows.values_list(
-        "evaluation__edition", "evaluation__submission__method", "evaluation__submission"
-    ):
-        best.setdefault((edition, method), submission)
+    by_metric: dict[str, list[Edition]] = {}
+    for edition in editions:
+        by_metric.setdefault(edition.rules.primary.name, []).append(edition)
+    for metric, some in by_metric.items():
+        rows = _ranking_scores(some, metric=metric).filter(evaluation__submission__method__in=methods)
+        for edition_id, method, submission in rows.values_list(
+            "evaluation__edition", "evaluation__submission__method", "evaluation__submission"
+        ):
+            best.setdefault((edition_id, method), submission)
     return set(best.values())
 
 
-def _entry_in(editions: Iterable[Edition]) -> QuerySet[Score]:
-    """Return the MiD scores in these editions, best first, then earliest."""
+def _ranking_scores(editions: Iterable[Edition], *, metric: str) -> QuerySet[Score]:
+    """Return the scores by which this metric ranks these editions, best first, then earliest."""
     return Score.objects.filter(
         evaluation__edition__in=list(editions),
         evaluation__status=Status.SCORED,
         evaluation__submission__withdrawn_at=None,
-        metric=PRIMARY,
+        metric=metric,
         ttc_range=OVERALL,
     ).order_by("value", "evaluation__submission__submitted_at")
 
@@ -200,7 +203,8 @@ def _entry_in(editions: Iterable[Edition]) -> QuerySet[Score]:
 
 def teams_best_other(submission: Submission, position: BoardPosition) -> Entry | None:
     """Return the team's best other entry on the same board, private ones included."""
-    others = _entry_in([position.edition]).filter(
+    edition = position.edition
+    others = _ranking_scores([edition], metric=edition.rules.primary.name).filter(
         evaluation__submission__method__team=submission.method.team_id
     )
     best_pk = others.exclude(evaluation__submission=submission).values_list("evaluation", flat=True).first()
@@ -223,11 +227,11 @@ def teams_best_other(submission: Submission, position: BoardPosition) -> Entry |
 
 
 def nearest_published(progress: Progress, position: BoardPosition) -> Entry | None:
-    """Return the published result with the nearest MiD; of two as near the better one."""
-    mid = (progress.scores or {}).get(PRIMARY)
+    """Return the published result with the nearest score; of two as near the better one."""
+    own = primary_value(progress.scores)
     near = [
-        (abs(value - mid), value, row)
+        (abs(value - own), value, row)
         for row in position.rows
-        if row.kind == "published" and mid is not None and (value := row.scores[PRIMARY]) is not None
+        if row.kind == "published" and own is not None and (value := row.value) is not None
     ]
     return min(near, key=lambda each: each[:2])[2] if near else None

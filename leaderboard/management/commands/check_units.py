@@ -35,7 +35,7 @@ class Command(RefusingCommand):
                 f"With fewer than {MIN_DAYS} days the recording stays the unit; a column unit of the ground "
                 "truth can name another one."
             )
-        self.stdout.write("SE factor  correlation       p  overall MiD of")
+        self.stdout.write(f"SE factor  correlation       p  overall {edition.rules.primary.symbol} of")
         for what, check in rows:
             numbers = (
                 f"{check.se_factor:9.2f}  {check.correlation:11.3f}  {check.p:6.4f}"

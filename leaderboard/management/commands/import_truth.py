@@ -7,6 +7,7 @@ from typing import Any
 from django.utils import timezone
 
 from evaluator.counting import counted
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PROTOCOLS
 from leaderboard.editions import ground_truth
 from leaderboard.management.arguments import RefusingCommand
 
@@ -17,7 +18,7 @@ class Command(RefusingCommand):
     def add_arguments(self, parser: ArgumentParser) -> None:
         parser.add_argument("split", help="val, test or demo")
         parser.add_argument("path", type=Path, help="a CSV file or a folder of annotation files")
-        parser.add_argument("--protocol", default="tsttc-1", choices=["tsttc-1", "toolkit"])
+        parser.add_argument("--protocol", default=DEFAULT_PROTOCOL, choices=sorted(PROTOCOLS))
 
     def handle(self, *args: Any, **options: Any) -> None:
         edition = ground_truth.import_truth(

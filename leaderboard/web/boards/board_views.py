@@ -40,6 +40,7 @@ def draw_board(
     now = timezone.now()
     query, faults = board_query.forgiving(request.GET, now=now, has_time=edition is None)
     shown, query = _shown(request, split, edition, query, faults)
+    primary = shown.rules.primary.symbol
     context = {
         "board": shown,
         "table": tables.board_table(shown, query=query, now=now),
@@ -52,6 +53,7 @@ def draw_board(
         ),
         "ladder": rank_ladder(shown.unfiltered, primary=shown.rules.score_names[0]),
         "exports": export_views.offers(shown, edition, query),
+        "progress_label": f"{primary} of each method by date, with the lowest {primary} so far.",
         "n_withdrawn": sum(entry.withdrawn_at is not None for entry in shown.unfiltered),
     }
     # Who types into the form is no program that got its request wrong: the answer stands at the field.

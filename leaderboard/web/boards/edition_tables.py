@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from evaluator.counting import counted
-from evaluator.metrics.protocol import PRIMARY
+from evaluator.metrics.protocol import primary_value
 from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import history
@@ -95,10 +95,15 @@ def rescored_notice(rescored: history.Rescored | None) -> dict[str, Any] | None:
 
 
 def _outcome(old: Evaluation | None, new: Evaluation | None, former: int) -> str:
-    before, after = _mid(old), _mid(new)
+    before, after = _value_text(old), _value_text(new)
     if new and new.status == Status.SCORED:
-        return f"MiD stays {after}." if before == after else f"MiD {before} → {after}."
-    kept = f" Its result in edition {former} stays: MiD {before}." if before != tables.ABSENT else ""
+        symbol = new.edition.rules.primary.symbol
+        if old and old.edition.rules.primary != new.edition.rules.primary:
+            return f"{old.edition.rules.primary.symbol} {before} → {symbol} {after}."
+        return f"{symbol} stays {after}." if before == after else f"{symbol} {before} → {after}."
+    kept = ""
+    if old and before != tables.ABSENT:
+        kept = f" Its result in edition {former} stays: {old.edition.rules.primary.symbol} {before}."
     if new is None or new.status == Status.CANCELLED:
         return f"The new edition leaves this file out.{kept}"
     if new.status == Status.REJECTED:
@@ -108,11 +113,11 @@ def _outcome(old: Evaluation | None, new: Evaluation | None, former: int) -> str
     return f"This file is waiting to be re-scored.{kept}"
 
 
-def _mid(evaluation: Evaluation | None) -> str:
+def _value_text(evaluation: Evaluation | None) -> str:
+    """The score that ranks."""
     if evaluation is None:
         return tables.ABSENT
-    mid = flat_scores(evaluation)[PRIMARY]
-    return format_rounded(mid, decimals=evaluation.edition.decimals)
+    return format_rounded(primary_value(flat_scores(evaluation)), decimals=evaluation.edition.decimals)
 
 
 def running(edition: Edition, progress: RescoringProgress) -> dict[str, Any]:
@@ -148,9 +153,10 @@ def rate_words(rate_per_s: float) -> str:
 
 def change_table(preview: Preview) -> dict[str, Any]:
     """Return the preview for the template."""
+    primary = preview.edition.rules.primary.name
     return {
-        "headings": [score_heading(name) for name in preview.names],
-        "rows": [_change_row(change, preview.names) for change in preview.entries],
+        "headings": [score_heading(name, primary=primary) for name in preview.names],
+        "rows": [_change_row(change, preview.names, primary=primary) for change in preview.entries],
         "n_rejected_in_both": len(preview.changes) - len(preview.entries),
         "truth": _change_words(preview.truth, preview.published, preview.edition),
         "totals": _totals(preview),
@@ -176,7 +182,7 @@ def _totals(preview: Preview) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _change_row(change: Change, names: Sequence[str]) -> dict[str, Any]:
+def _change_row(change: Change, names: Sequence[str], *, primary: str) -> dict[str, Any]:
     old_status, new_status = (_STATUS_LABELS[s] for s in (change.old_status, change.new_status))
     is_news = change.problems and change.old_status != change.new_status
     reason = change.problems[0]["message"] if is_news else ""
@@ -185,15 +191,15 @@ def _change_row(change: Change, names: Sequence[str]) -> dict[str, Any]:
         "has_changed": change.old_rank != change.new_rank,
         "status": new_status if old_status == new_status else f"{new_status}, was {old_status}",
         "is_worse_off": change.old_status == Status.SCORED and change.new_status in _ENDED_BADLY,
-        "differences": [_difference(name, change) for name in names],
+        "differences": [_difference(name, change, primary=primary) for name in names],
         "summary": reason.partition(": ")[0],
         "reason": reason,  # why it is rejected now and was not
         "n_more_problems": max(0, len(change.problems) - 1),
     }
 
 
-def _difference(name: str, change: Change) -> dict[str, str]:
-    delta, css = change.delta[name], column_css(name).replace("wide", "")
+def _difference(name: str, change: Change, *, primary: str) -> dict[str, str]:
+    delta, css = change.delta[name], column_css(name, primary=primary).replace("wide", "")
     return {
         "old": format_rounded(change.old.get(name), decimals=change.old_decimals),
         "new": format_rounded(change.new.get(name), decimals=change.new_decimals),

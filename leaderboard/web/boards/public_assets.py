@@ -18,7 +18,7 @@ from leaderboard.web.lookups import split_or_404
 
 @require_safe
 def badge(request: HttpRequest, method_id: UUID) -> HttpResponse:
-    """Draw rank and MiD of a method on `?split=`."""
+    """Draw rank and score of a method on `?split=`."""
     split = split_or_404(request, request.GET.get("split") or MAIN_SPLIT)
     entries = snapshots.board(split=split, viewer=AnonymousUser()).entries
     entry = next((entry for entry in entries if entry.method_id == method_id), None)

@@ -10,7 +10,6 @@ from django.utils.safestring import SafeString
 
 from evaluator.metrics.protocol import (
     OVERALL,
-    PRIMARY,
     grouped_names,
     known_ranges,
     metric_of,
@@ -116,7 +115,9 @@ def score_groups(names: Iterable[str], *, n_whiskers: int = 0) -> tuple[Group, .
     )
 
 
-def score_heading(name: str, query: BoardQuery | None = None, scale: WhiskerScale | None = None) -> Heading:
+def score_heading(
+    name: str, query: BoardQuery | None = None, scale: WhiskerScale | None = None, *, primary: str
+) -> Heading:
     metric, ttc_range = metric_of(name), range_of(name)
     seconds = f"{ttc_range.name} {ttc_range.seconds}" if ttc_range else OVERALL
     return Heading(
@@ -128,7 +129,7 @@ def score_heading(name: str, query: BoardQuery | None = None, scale: WhiskerScal
         spoken=f"{metric.symbol}, {seconds}",
         href=sort_href(name, query),
         aria_sort=aria_sort_of(name, query),
-        css=column_css(name),
+        css=column_css(name, primary=primary),
         range_css=range_css(name),
         metric=metric.symbol,
         axis=whiskers.axis(scale) if scale else NOTHING,
@@ -148,7 +149,7 @@ def score_cells(
         cells.append(
             Cell(
                 text=format_rounded(value, decimals=entry.decimals),
-                css=cell_css(name, value, entry.decimals),
+                css=cell_css(name, value, entry.decimals, primary=entry.primary),
                 range_css=range_css(name),
                 is_best=name in entry.best,
                 is_second=name in entry.second,
@@ -184,20 +185,20 @@ def figure_css(texts: Iterable[str]) -> str:
     return f"figure w{max((len(text) for text in texts), default=0)}"
 
 
-def column_css(name: str) -> str:
+def column_css(name: str, *, primary: str) -> str:
     """Return the class of a score's column: the ranking one, the first of a group, or another.
 
-    >>> column_css("mid"), column_css("rte"), column_css("rte_large")
-    ('primary first', 'overall first', 'wide')
+    >>> [column_css(name, primary="mid") for name in ("mid", "rte", "rte_large")]
+    ['primary first', 'overall first', 'wide']
     """
     if split_name(name)[1] != OVERALL:
         return "wide"
-    return "primary first" if name == PRIMARY else "overall first"
+    return "primary first" if name == primary else "overall first"
 
 
-def cell_css(name: str, value: float | None, decimals: int) -> str:
+def cell_css(name: str, value: float | None, decimals: int, *, primary: str) -> str:
     """Return the class of a number: its column and alignment."""
-    css = column_css(name)
+    css = column_css(name, primary=primary)
     if value is None:
         return f"{css} absent"
     return css if decimals == SCORED_DECIMALS else f"{css} d{decimals}"

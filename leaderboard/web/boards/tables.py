@@ -8,11 +8,11 @@ from uuid import UUID
 
 from django.core.paginator import Page, Paginator
 
-from evaluator.metrics.protocol import PRIMARY, Protocol, TTCRange, grouped_names, range_of
+from evaluator.metrics.protocol import Protocol, TTCRange, grouped_names, range_of
 from evaluator.scoring.scores import floor_sentence
 from leaderboard.boards import movement
 from leaderboard.boards.listing import Board
-from leaderboard.boards.rows import ConfidenceInterval, Entry
+from leaderboard.boards.rows import Entry
 from leaderboard.exports.tables import team_of
 from leaderboard.models import Edition, Visibility
 from leaderboard.statistics import confidence
@@ -37,7 +37,7 @@ NEW_FOR: Final = timedelta(days=14)
 _WHY_UNSCORABLE: Final = {
     "missing-keys": "Edition {} added sequences that its file does not predict.",
     "unknown-keys": "Edition {} removed sequences that its file predicts.",
-    "undefined-error": "The protocol of edition {} has no MiD for predictions that are too close to 0.",
+    "undefined-error": "The protocol of edition {} has no error for predictions that are too close to 0.",
 }
 
 
@@ -76,7 +76,7 @@ class BoardRow:
     @property
     def can_be_compared(self) -> bool:
         """Tell whether it can be compared: papers print no values per recording."""
-        return self.entry.method_id is not None and self.entry.scores[PRIMARY] is not None
+        return self.entry.method_id is not None and self.entry.value is not None
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,7 @@ class BoardTable:
     range_choices: tuple[tuple[str, str, bool], ...]
     groups: tuple[Group, ...]
     score_headings: tuple[Heading, ...]
+    primary: str  # the symbol of the metric that ranks
     rows: tuple[BoardRow, ...]
     moved_since: date | None  # None where no rank has moved
     sources: list[tuple[str, str]]  # what published rows are quoted from: citation and address
@@ -148,7 +149,10 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
         range_choices=_range_choices(names, query),
         groups=score_groups(names, n_whiskers=len(scales) if is_of_one else 0),
         has_one_whisker=bool(scales) and not is_of_one,
-        score_headings=tuple(score_heading(name, query, scales.get(name)) for name in names),
+        score_headings=tuple(
+            score_heading(name, query, scales.get(name), primary=board.rules.primary.name) for name in names
+        ),
+        primary=board.rules.primary.symbol,
         rows=rows,
         moved_since=movement.since(now=now).date() if any(row.moved for row in rows) else None,
         sources=sources,
@@ -180,7 +184,7 @@ def _note(entry: Entry, present: Edition | None) -> str:
 
 
 def _reason(board: Board, *, has_intervals: bool) -> str:
-    is_scored = any(e.kind == "submission" and e.scores.get(PRIMARY) is not None for e in board.entries)
+    is_scored = any(e.kind == "submission" and e.value is not None for e in board.entries)
     if has_intervals or board.edition is None or not is_scored:
         return ""
     return confidence.why_no_interval(board.edition) or ("The confidence intervals are being computed.")
@@ -203,7 +207,7 @@ def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, Whisker
 
 def _range_choices(names: Sequence[str], query: BoardQuery) -> tuple[tuple[str, str, bool], ...]:
     sorted_by = query.sort.removeprefix("-")
-    chosen = range_css(sorted_by) if sorted_by in names else range_css(PRIMARY)
+    chosen = range_css(sorted_by) if sorted_by in names else range_css(names[0])
     labels = {range_css(name): bounds.seconds if (bounds := range_of(name)) else "Overall" for name in names}
     return tuple((css, label, css == chosen) for css, label in labels.items())
 
@@ -215,7 +219,7 @@ def counted_ranges(rules: Protocol, counts: Mapping[str, int]) -> list[tuple[TTC
 
 def rank_range(entry: Entry) -> str:
     """Word the 95 % rank range; empty where its rank is the only one."""
-    interval = entry.intervals.get(PRIMARY, ConfidenceInterval())
+    interval = entry.interval
     if interval.rank_low is None or interval.rank_high is None:
         return ""
     if interval.rank_low == interval.rank_high == entry.rank:

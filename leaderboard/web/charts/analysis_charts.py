@@ -5,8 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from evaluator.counting import counted
-from evaluator.metrics.protocol import known_metrics
-from evaluator.metrics.registry import MID, Metric
+from evaluator.metrics.registry import Metric
 from evaluator.scoring.results import format_rounded
 from leaderboard.models import Analysis
 from leaderboard.web.charts.chart_options import (
@@ -39,13 +38,15 @@ Row = Mapping[str, Any]
 
 def error_analysis_tables(closer: Analysis) -> dict[str, Any]:
     content, distribution = closer.content, closer.content["distribution"]
-    errors = [metric for metric in known_metrics().values() if metric.name in distribution]
+    rules = closer.evaluation.edition.rules
+    errors = [metric for metric in rules.metrics if metric.name in distribution]
     quantiles = zip(*(distribution[metric.name] for metric in errors), strict=True)
     return {
         "n_sequences": counted(content["n_sequences"], "sequence"),
         "n_recordings": counted(content["n_recordings"], "recording"),
         "curve": curve(content["curve"], errors),
-        "histogram": histogram(content["histogram"]),
+        "histogram": histogram(content["histogram"], rules.primary),
+        "primary": rules.primary.symbol,
         "errors": errors,
         "quantiles": [
             (f"{100 * row[0]['quantile']:.0f} %", [format_rounded(each["value"]) for each in row])
@@ -151,13 +152,13 @@ def _value_words(row: Row, metric: Metric) -> str:
 # --- how errors are distributed --------------------------------------------------------------------------
 
 
-def histogram(bins: Sequence[Row]) -> Chart:
-    """Draw the number of sequences in each bin of MiD; the last bar holds all larger errors."""
+def histogram(bins: Sequence[Row], metric: Metric) -> Chart:
+    """Draw the number of sequences in each bin of a metric; the last bar holds all larger errors."""
     if not bins:
         return empty("histogram")
     words = [_bin_words(row) for row in bins]
     bar_marks = [
-        Mark(i, row["n"], (f"{MID.symbol} {text}", counted(row["n"], "sequence")))
+        Mark(i, row["n"], (f"{metric.symbol} {text}", counted(row["n"], "sequence")))
         for i, (row, text) in enumerate(zip(bins, words, strict=True))
     ]
     scale = ticks_axis(_bar_ticks(bins), low=0.0, high=float(len(bins)))
@@ -166,13 +167,13 @@ def histogram(bins: Sequence[Row]) -> Chart:
         x_axes=[bar_axis],
         y_axes=[y_axis("Sequences", {"type": "value", "min": 0, "minInterval": 1})],
         series=[bars("Sequences", bar_marks, "--s1")],
-        further_x_axes=[x_axis(f"{MID.title} ({MID.symbol}), {MID.unit}", scale)],
+        further_x_axes=[x_axis(f"{metric.title} ({metric.symbol}), {metric.unit}".rstrip(", "), scale)],
     )
     return Chart(
         kind="histogram",
-        label="Number of sequences by MiD; the last bar holds all larger values.",
+        label=f"Number of sequences by {metric.symbol}; the last bar holds all larger values.",
         options=frame.options(),
-        columns=(MID.heading, "Sequences"),
+        columns=(metric.heading, "Sequences"),
         rows=tuple((text, grouped(row["n"])) for text, row in zip(words, bins, strict=True)),
         numbers=(1,),
     )
@@ -184,7 +185,7 @@ def _bin_words(row: Row) -> str:
 
 
 def _bar_ticks(bins: Sequence[Row]) -> list[tuple[float, str]]:
-    """Return round values of MiD at their positions among bars of equal width.
+    """Return round values of the error at their positions among bars of equal width.
 
     >>> _bar_ticks([{"low": 0.0}, {"low": 4.0}, {"low": 8.0}, {"low": 12.0}])
     [(0.0, '0'), (1.25, '5'), (2.5, '10'), (3.5, 'more')]

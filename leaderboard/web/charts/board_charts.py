@@ -9,8 +9,7 @@ from typing import Final
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
-from evaluator.metrics.protocol import PRIMARY
-from evaluator.metrics.registry import MID
+from evaluator.metrics.registry import Metric
 from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import Entry
 from leaderboard.boards.snapshots import Attempt
@@ -47,9 +46,13 @@ class _Placed:
     x_text: str
     is_front: bool = False
 
-    def mark(self, praise: str) -> Mark:
-        value = error_text(MID, self.y, decimals=self.entry.decimals)
-        read = [self.entry.method, team_of(self.entry), f"{value} {MID.unit}, {self.x_text}"]
+    def mark(self, praise: str, metric: Metric) -> Mark:
+        value = error_text(metric, self.y, decimals=self.entry.decimals)
+        read = [
+            self.entry.method,
+            team_of(self.entry),
+            f"{value} {metric.unit}".rstrip() + f", {self.x_text}",
+        ]
         return Mark(
             self.x, self.y, (*read, praise) if self.is_front else tuple(read), method_href(self.entry)
         )
@@ -64,18 +67,19 @@ def _with_front(placed: Iterable[tuple[float, float, Entry, str]]) -> list[_Plac
     return points
 
 
-def _drawn(points: Sequence[_Placed]) -> tuple[list[_Placed], str]:
+def _drawn(points: Sequence[_Placed], metric: Metric) -> tuple[list[_Placed], str]:
     """Return the front, the best points behind it, and a sentence on those left out."""
     behind = sorted((each for each in points if not each.is_front), key=lambda each: each.y)
     if len(behind) <= MAX_BEHIND:
         return list(points), ""
     left_out = set(map(id, behind[MAX_BEHIND:]))
     drawn = [each for each in points if id(each) not in left_out]
-    return drawn, f"Shown are the {len(drawn):,} with the lowest MiD, or on the line, of {len(points):,}."
+    lowest = f"the {len(drawn):,} with the lowest {metric.symbol}"
+    return drawn, f"Shown are {lowest}, or on the line, of {len(points):,}."
 
 
 def _front_series(
-    points: Sequence[_Placed], *, line: str, praise: str, end: float
+    points: Sequence[_Placed], metric: Metric, *, line: str, praise: str, end: float
 ) -> tuple[list[Option], list[str]]:
     """Return the series of submissions and of published results, and the legend's names."""
     front = [each for each in points if each.is_front]
@@ -86,10 +90,10 @@ def _front_series(
         if not of_kind:
             continue
         names.append(name)
-        behind = [each.mark("") for each in of_kind if not each.is_front]
+        behind = [each.mark("", metric) for each in of_kind if not each.is_front]
         series.append(marks(name, behind, Look("--quiet", symbol, 9.0, is_hollow=True)))
         ahead = [i for i, each in enumerate(front) if each.entry.kind == kind]
-        drawn = [each.mark(praise) for each in front]
+        drawn = [each.mark(praise, metric) for each in front]
         series.append(named_marks(name, drawn, ahead, Look("--s1", symbol, 11.0)))
     return series, names
 
@@ -114,18 +118,18 @@ def decimals_css(entry: Entry, most: int) -> str:
 # --- progress over time ----------------------------------------------------------------------------------
 
 
-def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Chart:
-    """Draw MiD of every submission by day, and published results in the middle of their year."""
+def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = (), *, metric: Metric) -> Chart:
+    """Draw the ranking score of every submission by day, and published results by year."""
     by_method = {entry.method_id: entry for entry in entries if entry.method_id is not None}
     quoted = [
         (entry, value, entry.year)
         for entry in entries
-        if entry.kind == "published" and entry.year and (value := entry.scores[PRIMARY]) is not None
+        if entry.kind == "published" and entry.year and (value := entry.value) is not None
     ]
     sent = [
         (by_method[attempt.method_id], value, _day(attempt.at))
         for attempt in attempts
-        if attempt.method_id in by_method and (value := attempt.scores[PRIMARY]) is not None
+        if attempt.method_id in by_method and (value := attempt.value) is not None
     ]
     if not quoted and not sent:
         return empty("progress")
@@ -133,21 +137,23 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Char
         (_ms(datetime(year, 7, 1, tzinfo=UTC)), value, entry, str(year)) for entry, value, year in quoted
     ]
     placed += [(_ms(day), value, entry, f"{day:%Y-%m-%d}") for entry, value, day in sent]
-    points, note = _drawn(_with_front(placed))
+    points, note = _drawn(_with_front(placed), metric)
     first, last = _time_range([day for *_, day in sent], [year for *_, year in quoted])
-    series, names = _front_series(points, line="Best so far", praise="the best when it came", end=_ms(last))
+    series, names = _front_series(
+        points, metric, line="Best so far", praise="the best when it came", end=_ms(last)
+    )
     frame = Frame(
         x_axes=[x_axis(_time_title(first, last), _time_axis(first, last))],
-        y_axes=[error_axis(MID, [each.y for each in points], room=_ROOM)],
+        y_axes=[error_axis(metric, [each.y for each in points], room=_ROOM)],
         series=series,
         names=names,
         more=ZOOMABLE,
     )
     return Chart(
         kind="progress",
-        label=f"MiD of each method by date, with the lowest MiD so far: {_front_words(points)}.",
+        label=f"{progress_label(metric)[:-1]}: {_front_words(points, metric)}.",
         options=frame.options(),
-        columns=("Date", "Method", "Team", MID.heading, "Best so far"),
+        columns=("Date", "Method", "Team", metric.heading, "Best so far"),
         rows=tuple(
             (each.x_text, each.entry.method, team_of(each.entry), value, "yes" if each.is_front else "")
             for each, value in zip(points, _value_cells(points), strict=True)
@@ -156,6 +162,11 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Char
         is_zoomable=True,
         note=note,
     )
+
+
+def progress_label(metric: Metric) -> str:
+    """What the chart shows, for those who cannot see it."""
+    return f"{metric.symbol} of each method by date, with the lowest {metric.symbol} so far."
 
 
 # Dragging over a chart looks closer at a stretch of its level axis; the script turns it on.
@@ -174,9 +185,11 @@ ZOOMABLE: Final = {
 }
 
 
-def _front_words(points: Sequence[_Placed]) -> str:
+def _front_words(points: Sequence[_Placed], metric: Metric) -> str:
     front = [each for each in points if each.is_front]
-    texts = [f"{each.entry.method} {error_text(MID, each.y, decimals=each.entry.decimals)}" for each in front]
+    texts = [
+        f"{each.entry.method} {error_text(metric, each.y, decimals=each.entry.decimals)}" for each in front
+    ]
     return texts[0] if len(texts) == 1 else f"from {texts[0]} to {texts[-1]}"
 
 
@@ -216,32 +229,36 @@ def _time_title(first: datetime, last: datetime) -> str:
 # --- accuracy against latency ----------------------------------------------------------------------------
 
 
-def latency(entries: Sequence[Entry]) -> Chart:
-    """Draw MiD against latency, with the Pareto front."""
+def latency(entries: Sequence[Entry], *, metric: Metric) -> Chart:
+    """Draw the metric that ranks against latency, with the Pareto front."""
     points, note = _drawn(
         _with_front(
             (latency_ms, value, entry, f"{latency_ms:g} ms")
             for entry in entries
             if entry.is_visible_to_all
             and (latency_ms := entry.details["latency_ms"]) is not None
-            and (value := entry.scores[PRIMARY]) is not None
-        )
+            and (value := entry.value) is not None
+        ),
+        metric,
     )
     if not points:
         return empty("latency")
     axis = log_axis(each.x for each in points)
-    series, names = _front_series(points, line="Pareto front", praise="on the Pareto front", end=axis["max"])
+    series, names = _front_series(
+        points, metric, line="Pareto front", praise="on the Pareto front", end=axis["max"]
+    )
     frame = Frame(
         x_axes=[x_axis("Latency in ms (log scale)", axis)],
-        y_axes=[error_axis(MID, [each.y for each in points], room=_ROOM)],
+        y_axes=[error_axis(metric, [each.y for each in points], room=_ROOM)],
         series=series,
         names=names,
     )
     return Chart(
         kind="latency",
-        label=f"MiD of each method against its latency, with the Pareto front: {_front_words(points)}.",
+        label=f"{metric.symbol} of each method against its latency, with the Pareto front: "
+        f"{_front_words(points, metric)}.",
         options=frame.options(),
-        columns=("Method", "Team", "Latency in ms", "Hardware", MID.heading, "On the Pareto front"),
+        columns=("Method", "Team", "Latency in ms", "Hardware", metric.heading, "On the Pareto front"),
         rows=tuple(
             (
                 each.entry.method,

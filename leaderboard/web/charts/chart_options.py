@@ -118,7 +118,7 @@ def log_axis(values: Iterable[float], *, room: float = 0.0) -> Option:
 def error_axis(metric: Metric, values: Iterable[float], *, room: float = 0.0) -> Option:
     """Make an axis of errors from 0, or logarithmic and labelled so."""
     known = list(values) or [1.0]
-    name = f"{metric.symbol}, {metric.unit}"
+    name = f"{metric.symbol}, {metric.unit}".rstrip(", ")
     if min(known) <= 0 or max(known) <= _MAX_STRAIGHT * min(known):
         return y_axis(name, {"type": "value", "min": 0})
     return y_axis(f"{name} (log scale)", log_axis(known, room=room))

@@ -31,7 +31,7 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
     context = {
         "board": board,
         "progress": progress(board),
-        "latency": board_charts.latency(shown),
+        "latency": board_charts.latency(shown, metric=board.rules.primary),
         "profile": profile_chart.profile(shown[:N_PROFILES]),
         "n_profiles": N_PROFILES,
         "significance": significance_chart.significance(pairs, split=board.split.pk),
@@ -54,4 +54,4 @@ def progress_options(request: HttpRequest, split: str) -> HttpResponse:
 def progress(board: Board) -> Chart:
     shown = [entry for entry in board.entries if entry.is_visible_to_all]
     attempts = snapshots.shown(split=board.split, edition=board.edition).attempts if board.edition else ()
-    return board_charts.progress(shown, attempts)
+    return board_charts.progress(shown, attempts, metric=board.rules.primary)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
-from evaluator.metrics.protocol import OVERALL, PRIMARY, grouped_names, metric_of, range_of, split_name
+from evaluator.metrics.protocol import OVERALL, grouped_names, metric_of, range_of, split_name
 from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.web.boards.score_columns import figure_css, interval_words
@@ -26,7 +26,7 @@ from leaderboard.web.charts.chart_series import SERIES_INKS, SERIES_SYMBOLS, Loo
 
 
 def profile(entries: Sequence[Entry]) -> Chart:
-    shown = [entry for entry in entries if entry.scores[PRIMARY] is not None][: len(SERIES_INKS)]
+    shown = [entry for entry in entries if entry.value is not None][: len(SERIES_INKS)]
     if not shown:
         return empty("profile")
     panels = grouped_names(shown[0].scores)

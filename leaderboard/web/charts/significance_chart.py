@@ -1,4 +1,4 @@
-"""The chart of significance: every pair of the first rows of a board, by the p-value of their MiD."""
+"""The chart of significance: every pair of the first rows of a board, by the p-value of what ranks them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,8 +8,8 @@ from urllib.parse import urlencode
 from django.urls import reverse
 
 from evaluator import Difference
-from evaluator.metrics.protocol import PRIMARY
-from evaluator.metrics.registry import MID
+from evaluator.metrics.protocol import metric_of
+from evaluator.metrics.registry import Metric
 from evaluator.tables.sentences import p_cell
 from leaderboard.boards.rows import Entry
 from leaderboard.statistics.comparisons import Pair
@@ -37,31 +37,36 @@ class _Cell:
     split: str
 
     @property
-    def mid_difference(self) -> Difference | None:
-        """Return the difference in MiD; None until a worker has computed it."""
-        return (self.pair.differences or {}).get(PRIMARY)
+    def difference(self) -> Difference | None:
+        """Return the difference in the score that ranks; None until a worker has computed it."""
+        return self.pair.difference
+
+    @property
+    def metric(self) -> Metric:
+        """Return the metric that ranks."""
+        return metric_of(self.pair.first.primary)
 
     @property
     def verdict(self) -> str:
         """Return the class of its p-value, or why there is none."""
-        if self.mid_difference is None or self.mid_difference.p_below is None:
+        if self.difference is None or self.difference.p_below is None:
             return UNKNOWN
-        return SIGNIFICANT.get(self.mid_difference.p_below, UNDECIDED)
+        return SIGNIFICANT.get(self.difference.p_below, UNDECIDED)
 
     def texts(self) -> tuple[str, str, str]:
-        if self.mid_difference is None:
+        if self.difference is None:
             return "being computed", "", ""
         decimals = self.pair.first.decimals
-        difference = signed(self.mid_difference.difference, decimals=decimals)
-        if self.mid_difference.low is None or self.mid_difference.high is None:
+        difference = signed(self.difference.difference, decimals=decimals)
+        if self.difference.low is None or self.difference.high is None:
             return difference, "", "not compared"
-        ends = (signed(end, decimals=decimals) for end in (self.mid_difference.low, self.mid_difference.high))
-        return difference, " to ".join(ends), p_cell(self.mid_difference.p, self.mid_difference.p_below)
+        ends = (signed(end, decimals=decimals) for end in (self.difference.low, self.difference.high))
+        return difference, " to ".join(ends), p_cell(self.difference.p, self.difference.p_below)
 
     def mark(self) -> Mark:
         difference, interval, p = self.texts()
         first, second = self.pair.first, self.pair.second
-        words = f"{MID.symbol} {difference}" + (f" ({interval})" if interval else "")
+        words = f"{self.metric.symbol} {difference}" + (f" ({interval})" if interval else "")
         read = [f"{_named(first)} against {_named(second)}", words]
         read += [self.verdict if not p or self.verdict == UNKNOWN else f"p {p}: {self.verdict}"]
         query = urlencode({"split": self.split, "m": [first.method_id, second.method_id]}, doseq=True)
@@ -72,7 +77,7 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
     """Draw whether each row is significantly better than each below it."""
     if not pairs:
         return empty("significance")
-    entries = _entries(pairs)
+    entries, symbol = _entries(pairs), metric_of(pairs[0].first.primary).symbol
     index = {entry.method_id: i for i, entry in enumerate(entries)}
     pair_cells = [
         _Cell(index[pair.second.method_id] - 1, index[pair.first.method_id], pair, split) for pair in pairs
@@ -88,9 +93,9 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
     )
     return Chart(
         kind="significance",
-        label=f"Pairs of the first {len(entries)} methods by the p-value of their difference in MiD.",
+        label=f"Pairs of the first {len(entries)} methods by the p-value of their difference in {symbol}.",
         options=frame.options(),
-        columns=("Method", "Compared with", f"Difference in {MID.symbol}", "95 % confidence interval", "p"),
+        columns=("Method", "Compared with", f"Difference in {symbol}", "95 % confidence interval", "p"),
         rows=tuple((_named(cell.pair.first), _named(cell.pair.second), *cell.texts()) for cell in pair_cells),
         numbers=(2, 4),
         is_low=len(entries) <= _FEW,

@@ -9,13 +9,13 @@ from django.utils.html import format_html
 from django.utils.text import get_text_list
 
 from evaluator import Difference
-from evaluator.metrics.protocol import PRIMARY, grouped_names
+from evaluator.metrics.protocol import grouped_names, metric_of
 from evaluator.scoring.results import format_rounded
 from evaluator.scoring.significance import significant_together, too_few_units
 from evaluator.tables import sentences
 from evaluator.tables.sentences import p_cell
 from evaluator.units import in_words
-from leaderboard.boards.rows import ConfidenceInterval, Entry
+from leaderboard.boards.rows import Entry
 from leaderboard.statistics.comparisons import Compared, Pair
 from leaderboard.web.boards.score_columns import Group, figure_css, score_groups, score_heading
 from leaderboard.web.charts import profile_chart, svg
@@ -43,12 +43,13 @@ def verdict(compared: Compared) -> str:
         return ""
     if len(compared.entries) == len(("first", "second")):
         return compared.pairs[0].sentence()
-    best = min(compared.entries, key=lambda entry: entry.scores[PRIMARY] or 0.0)
-    tested = [pair for pair in compared.pairs if not pair.withheld and PRIMARY in (pair.differences or {})]
+    best = min(compared.entries, key=lambda entry: entry.value or 0.0)
+    tested = [pair for pair in compared.pairs if not pair.withheld and pair.difference is not None]
     worse, alike = _worse_and_alike(best, tested)
     head = (
-        f"Of these {_NUMBERS[len(compared.entries)]}, {best.method} has the lowest MiD, "
-        f"{format_rounded(best.scores[PRIMARY], decimals=best.decimals)}."
+        f"Of these {_NUMBERS[len(compared.entries)]}, {best.method} has the lowest "
+        f"{metric_of(best.primary).symbol}, "
+        f"{format_rounded(best.value, decimals=best.decimals)}."
     )
     if compared.reason:
         few = in_words(compared.edition.unit)
@@ -61,19 +62,19 @@ def verdict(compared: Compared) -> str:
 
 
 def _worse_and_alike(best: Entry, tested: Sequence[Pair]) -> tuple[list[str], list[str]]:
-    """Return the methods that the best is significantly better than in MiD, and the others.
+    """Return the methods that the best is significantly better than, and the others.
 
     The best was chosen from the data, so all pairs are tested together. The board's marks and rank ranges
     outweigh this test.
     """
-    apart = significant_together([(pair.differences or {})[PRIMARY] for pair in tested])
+    apart = significant_together([pair.difference for pair in tested if pair.difference])
     worse: list[str] = []
     alike: list[str] = []
     for pair, is_apart in zip(tested, apart, strict=True):
         if best not in (pair.first, pair.second):
             continue
         other = pair.second if pair.first == best else pair.first
-        on_board, of_best = (each.intervals.get(PRIMARY, ConfidenceInterval()) for each in (other, best))
+        on_board, of_best = (each.interval for each in (other, best))
         is_worse = is_apart and not on_board.is_with_best
         is_worse |= (of_best.rank_high or math.inf) < (on_board.rank_low or 0)
         (worse if is_worse else alike).append(other.method)
@@ -115,7 +116,7 @@ def _difference_row(
 ) -> dict[str, Any]:
     decimals = pair.first.decimals  # both are of one edition
     return {
-        "heading": score_heading(name),
+        "heading": score_heading(name, primary=pair.first.primary),
         "first": format_rounded(pair.first.scores[name], decimals=decimals),
         "second": format_rounded(pair.second.scores[name], decimals=decimals),
         "difference": signed(difference.difference, decimals=decimals),

@@ -69,7 +69,7 @@ def _drawn(request: HttpRequest, compared: comparisons.Compared) -> HttpResponse
 
 def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None) -> dict[str, object]:
     board = snapshots.board(split=split, viewer=request.user)
-    entries = [entry for entry in board.entries if entry.method_id and entry.scores["mid"] is not None]
+    entries = [entry for entry in board.entries if entry.method_id and entry.value is not None]
     # A method's page asks for the choice of others beside it.
     chosen = [*request.GET.getlist("m"), *request.GET.getlist("with")]
     return {
@@ -79,6 +79,7 @@ def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None
             entry for i, entry in enumerate(entries) if i < MAX_OFFERED or str(entry.method_id) in chosen
         ],
         "n_in_all": len(entries),
+        "metric": board.rules.primary,
         "chosen": chosen,
         "max_methods": comparisons.MAX_METHODS,
         "refusal": refusal,

@@ -1,15 +1,18 @@
 """The facts on the documentation page, taken from the code."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
 from typing import Any, Final
 
 from django.conf import settings
 
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL, get_protocol
+from evaluator.metrics.protocol import PROTOCOLS, Protocol
 from evaluator.problems import PROBLEM_CODES
+from leaderboard.boards import listing
 from leaderboard.models import Split
 from leaderboard.quotas import admissions
+from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.formatting import size
 
 # What only maintainers meet, when they import ground truth.
@@ -38,14 +41,26 @@ def example_split(splits: Sequence[Split], *, now: datetime) -> Split | None:
     return next(is_open, None) or next((split for split in splits if split.has_ground_truth), None)
 
 
+def _follows_toolkit(protocol: Protocol) -> bool:
+    """Whether it differs from the dataset's toolkit near 0 at most."""
+    return replace(protocol, name="toolkit", near_zero_s=None) == PROTOCOLS["toolkit"]
+
+
 def docs(splits: Sequence[Split], *, now: datetime) -> dict[str, Any]:
     example = example_split(splits, now=now)
-    protocol = get_protocol(DEFAULT_PROTOCOL)
+    # The board that is quoted; without it the first.
+    main = next((split for split in splits if split.pk == MAIN_SPLIT), next(iter(splits), None))
+    protocol = listing.rules_of(main.current_edition if main else None)
+    ends = [end for each in protocol.ranges for end in each.closed_ends]
     return {
         "example": example.pk if example else "SPLIT",
         "has_manifest": example is not None,
         "is_open": example is not None and admissions.is_open(example, now=now),
         "protocol": protocol,
+        "limit": f"{protocol.limit_s:g}",
+        "has_open_ends": len(ends) < 2 * len(protocol.ranges),
+        "shared_end": next((f"{end:g}" for end in ends if ends.count(end) > 1), ""),
+        "follows_toolkit": _follows_toolkit(protocol),
         "boundaries": [boundary.replace("-", "−") for boundary in protocol.boundaries],
         "max_size": size(settings.MAX_PREDICTIONS_BYTES),
         "problem_codes": [

@@ -79,4 +79,5 @@ def _leading(main: Split) -> dict[str, Any]:
         "lead": lead_words(board),
         "fronts": [row for row in progress.rows if row[-1]],
         "note": progress.note,
+        "progress_label": progress.label,
     }

@@ -6,10 +6,9 @@ from typing import Any, Final
 from django.utils.text import get_text_list
 
 from evaluator.counting import counted
-from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.results import format_rounded
 from leaderboard.boards.listing import Board
-from leaderboard.boards.rows import ConfidenceInterval, Entry
+from leaderboard.boards.rows import Entry
 from leaderboard.exports.tables import team_of
 from leaderboard.statistics import confidence
 from leaderboard.web.boards.score_columns import interval_words
@@ -25,10 +24,8 @@ def leaders(board: Board) -> list[dict[str, Any]]:
         {
             "entry": entry,
             "team": team_of(entry),
-            "value": format_rounded(entry.scores[PRIMARY], decimals=entry.decimals),
-            "interval": interval_words(
-                entry.intervals.get(PRIMARY, ConfidenceInterval()), decimals=entry.decimals
-            ),
+            "value": format_rounded(entry.value, decimals=entry.decimals),
+            "interval": interval_words(entry.interval, decimals=entry.decimals),
             "rank_range": rank_range(entry).strip("()"),
         }
         for entry in _ranked(board)[:N_LEADERS]
@@ -48,14 +45,14 @@ def lead_words(board: Board) -> str:
     if len(first) > 1:
         return f"{_listed([entry.method for entry in first])} share the first rank."
     (leader,) = first
-    interval = leader.intervals.get(PRIMARY, ConfidenceInterval())
+    interval = leader.interval
     if interval.rank_low is None or interval.rank_high is None:
         return (
             f"It is not known whether the lead of {leader.method} is certain: {_why_unknown(board, leader)}"
         )
     if interval.rank_high == 1:
         return f"The lead of {leader.method} is certain: at 95 % confidence its rank is 1."
-    also = [e.method for e in ranked[1:] if e.intervals.get(PRIMARY, ConfidenceInterval()).rank_low == 1]
+    also = [e.method for e in ranked[1:] if e.interval.rank_low == 1]
     others = f" {_listed(also)} may also be first." if also else ""
     return (
         f"The lead of {leader.method} is not certain: at 95 % confidence its rank is "

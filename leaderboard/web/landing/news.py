@@ -7,12 +7,9 @@ from typing import Final
 
 from django.urls import reverse
 
-from evaluator.metrics.protocol import PRIMARY
-from evaluator.scoring.results import format_rounded
 from leaderboard.boards import snapshots
-from leaderboard.boards.rows import Entry
 from leaderboard.editions import history
-from leaderboard.exports import feeds
+from leaderboard.exports import badges, feeds
 from leaderboard.models import Publication, Split
 from leaderboard.web.boards import edition_tables
 
@@ -48,12 +45,5 @@ def _entries(splits: Sequence[Split]) -> Iterator[News]:
         for entry in shown.entries:
             if feeds.is_news(entry) and entry.listed_at:
                 href = reverse("method", args=[entry.method_id])
-                words = f"by {entry.team}, {_result(entry)} on {split.title}"
+                words = f"by {entry.team}, {badges.words(entry)} on {split.title}"
                 yield entry.listed_at, href, entry.method, words
-
-
-def _result(entry: Entry) -> str:
-    value = entry.scores[PRIMARY]
-    if entry.rank is None or value is None:
-        return "no MiD"
-    return f"rank {entry.rank}, MiD {format_rounded(value, decimals=entry.decimals)}"

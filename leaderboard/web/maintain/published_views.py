@@ -8,6 +8,7 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect
 from django.utils import timezone
 
+from evaluator.metrics.protocol import known_metrics
 from leaderboard.editions import papers, splits
 from leaderboard.editions.papers import BadDocument
 from leaderboard.errors.refusals import Refused
@@ -92,4 +93,13 @@ def published(request: HttpRequest) -> HttpResponse:
             words = (f"{len(names)} {outcome}" for outcome, names in vars(done).items())
             messages.success(request, f"Rows: {', '.join(words)}.")
             return redirect("maintain_published")
-    return form_page(request, "maintain/published.html", form, rows=splits.quoted())
+    return form_page(
+        request, "maintain/published.html", form, rows=[(row, _overall_words(row)) for row in splits.quoted()]
+    )
+
+
+def _overall_words(row: PublishedResult) -> str:
+    """The overall scores of a row."""
+    values = ((metric, row.scores.get(metric.name)) for metric in known_metrics().values())
+    words = (f"{each.symbol} {value}{each.unit_of_value}" for each, value in values if value is not None)
+    return ", ".join(words) or "–"

@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 
 from django.urls import reverse
 
-from evaluator.metrics.protocol import OVERALL, PRIMARY
+from evaluator.metrics.protocol import OVERALL
 from evaluator.scoring.results import format_rounded
 from evaluator.tables import sentences
 from leaderboard.boards.results import Result
@@ -51,7 +51,7 @@ class ResultGroup:
 
 def result_groups(entry: Entry, counts: Mapping[str, int]) -> tuple[ResultGroup, ...]:
     """Return the numbers of one result, with the number of sequences behind each."""
-    headings = [score_heading(name) for name in entry.scores]
+    headings = [score_heading(name, primary=entry.primary) for name in entry.scores]
     columns = iter(
         (heading, cell, grouped(counts.get(heading.caption)))
         for heading, cell in zip(headings, score_cells(entry), strict=True)
@@ -87,13 +87,13 @@ def method_result(result: Result) -> dict[str, Any]:
         "selection": sentences.selection({entry.method: len(result.attempts)}) if rank_range(entry) else "",
         "profile": profile_chart.profile((entry, *result.neighbours)),
         "compare_href": _compare_href(result),
-        "can_compare": entry.scores[PRIMARY] is not None,
+        "can_compare": entry.value is not None,
     }
 
 
 def _compare_href(result: Result) -> str:
     ids = [entry.method_id for entry in (result.entry, *result.neighbours) if entry.method_id is not None]
-    if len(ids) < MIN_METHODS or result.entry.scores[PRIMARY] is None:
+    if len(ids) < MIN_METHODS or result.entry.value is None:
         return ""
     query = urlencode([("split", result.split.pk), *(("m", pk) for pk in ids)])
     return f"{reverse('compare')}?{query}"
@@ -106,9 +106,13 @@ def submission_table(submissions: Iterable[Submission]) -> dict[str, Any]:
     names = {metric.name: metric.symbol for metric in errors}
     rows = []
     for submission, evaluation in evaluations:
-        values, decimals = flat_scores(evaluation), evaluation.edition.decimals
+        values, edition = flat_scores(evaluation), evaluation.edition
         cells = [
-            (cell_css(name, value, decimals), format_rounded(value, decimals=decimals), symbol)
+            (
+                cell_css(name, value, edition.decimals, primary=edition.rules.primary.name),
+                format_rounded(value, decimals=edition.decimals),
+                symbol,
+            )
             for name, symbol in names.items()
             for value in [values.get(name)]
         ]

@@ -5,6 +5,7 @@ from typing import Any
 from urllib.parse import urlencode
 
 from django.urls import reverse
+from django.utils.text import get_text_list
 
 from evaluator.counting import counted
 from evaluator.metrics.protocol import grouped_names, split_name
@@ -70,7 +71,7 @@ def _order_words(names: Iterable[str]) -> str:
     groups = grouped_names(names)
     symbols, columns = [metric.symbol for metric in groups], next(iter(groups.values()))
     ranges = ", ".join(split_name(name)[1] for name in columns)
-    return f"{', '.join(symbols[:-1])} and {symbols[-1]} (each {ranges})"
+    return f"{get_text_list(symbols, 'and')} ({'each ' if len(symbols) > 1 else ''}{ranges})"
 
 
 def _comparison_rows(

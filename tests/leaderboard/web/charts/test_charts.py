@@ -12,6 +12,7 @@ from django.contrib.auth.models import AnonymousUser
 from django.test import Client
 from django.utils import timezone
 
+from evaluator.metrics.registry import MID
 from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import Attempt
 from leaderboard.models import Comparison, Edition, Method, Submission, User
@@ -204,10 +205,10 @@ def test_of_a_large_board_the_front_and_the_lowest_are_drawn_and_the_chart_says_
         Attempt(first.method_id, uuid4(), began + timedelta(days=day), {"mid": mid})
         for day, mid in enumerate((60.0, 90.0, 80.0, 50.0, 70.0))
     ]
-    whole = board_charts.progress([first], attempts)
+    whole = board_charts.progress([first], attempts, metric=MID)
     assert (len(whole.rows), whole.note) == (5, "")
     monkeypatch.setattr(board_charts, "MAX_BEHIND", 2)
-    chart = board_charts.progress([first], attempts)
+    chart = board_charts.progress([first], attempts, metric=MID)
     assert [float(row[3].partition(">")[2].partition("<")[0]) for row in chart.rows] == [60, 80, 50, 70]
     assert chart.note == "Shown are the 4 with the lowest MiD, or on the line, of 5."
     assert sum(len(each["data"]) for each in chart.options["baseOption"]["series"][1:]) >= 4
