@@ -11,6 +11,7 @@ from django.db import transaction
 from django.utils import timezone
 
 import evaluator
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL
 from leaderboard import board_versions
 from leaderboard.editions import ground_truth
 from leaderboard.methods import editing
@@ -38,11 +39,13 @@ def truth_csv(path: Path, *, n: int = N_SEQUENCES, seed: int = 0, n_recordings: 
     return path
 
 
-def import_truth(tmp_path: Path, *, split: str = "test", **options: int) -> Edition:
+def import_truth(
+    tmp_path: Path, *, split: str = "test", protocol: str = DEFAULT_PROTOCOL, **options: int
+) -> Edition:
     """Open a split with made-up ground truth, without the quotas that most tests are not about."""
     Split.objects.update(quota_limit=None, quota_min_gap=timedelta(0), quota_rejected_limit=None)
     path = truth_csv(tmp_path / f"truth-{split}.csv", **options)
-    return ground_truth.import_truth(split_name=split, path=path, now=timezone.now())
+    return ground_truth.import_truth(split_name=split, path=path, protocol=protocol, now=timezone.now())
 
 
 def predictions(edition: Edition, *, factor: float = 1.1) -> bytes:
