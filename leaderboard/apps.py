@@ -6,7 +6,7 @@ from django.core import checks
 
 class LeaderboardConfig(AppConfig):
     name = "leaderboard"
-    verbose_name = "TSTTC leaderboard"
+    verbose_name = "Leaderboard"
 
     def ready(self) -> None:
         # Only now can the modules of the system checks be imported.

@@ -13,6 +13,7 @@ from typing import Any
 
 from django.core.management.utils import get_random_secret_key
 
+from leaderboard import benchmark
 from leaderboard.api import settings
 from leaderboard.ops import environment, logs
 from leaderboard.ops.environment import key_of_checkout, required
@@ -55,7 +56,11 @@ ALLOWED_HOSTS = required("TSTTC_ALLOWED_HOSTS", embedded="*").split(",")
 CSRF_TRUSTED_ORIGINS = env.list("TSTTC_CSRF_TRUSTED_ORIGINS", default=[])
 # The address that people quote; also what absolute links in messages are made of.
 SITE_URL = required("TSTTC_SITE_URL", embedded="http://127.0.0.1:8000").rstrip("/")
-SITE_NAME = env.str("TSTTC_SITE_NAME", default="TSTTC leaderboard")
+# What pages, exports, API and mails say of the benchmark.
+BENCHMARK = benchmark.read(
+    Path(env.str("TSTTC_BENCHMARK", default=str(benchmark.DEFAULT_PATH))),
+    site_name=env.str("TSTTC_SITE_NAME", default=""),
+)
 
 INSTALLED_APPS = [
     "leaderboard",
@@ -286,7 +291,7 @@ AUTH_PASSWORD_VALIDATORS = [
 LOGIN_URL = "account_login"
 LOGIN_REDIRECT_URL = "/submit/"
 LOGOUT_REDIRECT_URL = "/"
-ACCOUNT_EMAIL_SUBJECT_PREFIX = f"[{SITE_NAME}] "
+ACCOUNT_EMAIL_SUBJECT_PREFIX = f"[{BENCHMARK.site_name}] "
 vars().update(allauth_settings.SETTINGS)
 EMAIL_CONFIG = environment.mail_server(env.str("TSTTC_EMAIL_URL", default="consolemail://"))
 vars().update(EMAIL_CONFIG)
@@ -346,7 +351,7 @@ PAGE_RATES: dict[str, str | None] = {
 }
 if TESTING or not env.bool("TSTTC_THROTTLES", default=True):
     API_RATES, PAGE_RATES = dict.fromkeys(API_RATES), dict.fromkeys(PAGE_RATES)
-SPECTACULAR_SETTINGS = settings.SPECTACULAR_SETTINGS
+SPECTACULAR_SETTINGS = {**settings.SPECTACULAR_SETTINGS, "TITLE": f"{BENCHMARK.site_name} API"}
 
 # --- what is written down, and who may look --------------------------------------------------------------
 

@@ -39,6 +39,7 @@ class Row:
 class Origin:
     """The source of a table; `address` is permanent."""
 
+    site: str  # its name
     split: str
     address: str
     edition: int | None = None
@@ -68,7 +69,7 @@ class Export:
 
 def about(origin: Origin) -> tuple[str, ...]:
     """Describe the source of a table, so that a reader can retrieve it later."""
-    lines = [f"TSTTC leaderboard, {origin.split}: {origin.address}"]
+    lines = [f"{origin.site}, {origin.split}: {origin.address}"]
     if origin.edition is not None:
         facts = [f"Edition {origin.edition}"]
         if origin.protocol:

@@ -21,7 +21,6 @@ REST_FRAMEWORK: Final[dict[str, Any]] = {
     ],
 }
 SPECTACULAR_SETTINGS: Final[dict[str, Any]] = {
-    "TITLE": "TSTTC leaderboard API",
     "DESCRIPTION": "Submit prediction files, follow their evaluation, read the boards. Errors are problem "
     "details (RFC 9457) with stable codes.",
     "VERSION": "1",

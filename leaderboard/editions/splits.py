@@ -6,6 +6,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Final
 
+import msgspec
+from django.conf import settings
 from django.db import transaction
 from django.db.models import QuerySet
 from django.utils import timezone
@@ -21,51 +23,26 @@ from leaderboard.models.benchmark import SINCE_EVER
 PUBLISHED_DIR = Path(__file__).parent / "published"
 MAX_REASON: Final = 500
 
-SPLITS: tuple[dict[str, Any], ...] = (
-    {
-        "name": "test",
-        "title": "Test",
-        "description": "The hidden test set: the numbers that papers quote.",
-        "position": 0,
-        "is_hidden": True,
-        "decimals": 1,
-        **HIDDEN_QUOTA,
-    },
-    {
-        "name": "val",
-        "title": "Validation",
-        "description": "The validation set, whose ground truth comes with the dataset.",
-        "position": 1,
-        "is_hidden": False,
-        "decimals": 2,
-        "quota_limit": 50,
-    },
-    {
-        "name": "demo",
-        "title": "Demo",
-        "description": "Simulated data, for testing only.",
-        "position": 2,
-        "is_hidden": False,
-        "is_simulated": True,
-        "decimals": 2,
-        "quota_limit": 20,
-    },
-)
-
 
 def ensure_splits(*, split_model: Any = Split, result_model: Any = PublishedResult) -> None:
-    """Make the three splits and the published rows where they are missing.
+    """Make the benchmark's first splits and the rows of its paper where they are missing.
 
     Rows of a new split are there since ever, later ones since now. A migration passes its own models.
     """
-    now = timezone.now()
+    benchmark, now = settings.BENCHMARK, timezone.now()
     made = set()
     with transaction.atomic():
-        for fields in SPLITS:
-            _, is_new = split_model.objects.get_or_create(name=fields["name"], defaults=fields)
-            made |= {fields["name"]} if is_new else set()
-        known = [fields["name"] for fields in SPLITS]
-        for path in sorted(PUBLISHED_DIR.glob("*.json")):
+        for position, first in enumerate(benchmark.splits):
+            fields: dict[str, Any] = {
+                "position": position,
+                "decimals": 1 if first.is_hidden else 2,
+                **msgspec.structs.asdict(first),
+                **(HIDDEN_QUOTA if first.is_hidden else {}),
+            }
+            _, is_new = split_model.objects.get_or_create(name=first.name, defaults=fields)
+            made |= {first.name} if is_new else set()
+        known = [first.name for first in benchmark.splits]
+        for path in sorted(PUBLISHED_DIR.glob("*.json")) if benchmark.has_paper_tables else ():
             for row in papers.rows_of(_with_results(papers.parse(path.read_bytes())), splits=known, now=now):
                 names = {"split_id": row.pop("split_id"), "slug": row.pop("slug")}
                 row["added_at"] = SINCE_EVER if names["split_id"] in made else now

@@ -1,20 +1,18 @@
 """BibTeX of the benchmark, of papers with published results, and of methods."""
 
-import json
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
-from functools import lru_cache
-from pathlib import Path
 from typing import Final
+
+from django.conf import settings
 
 from evaluator.tables import layouts
 from evaluator.tables.escaping import latex, one_line
 from leaderboard.boards.rows import Entry
 from leaderboard.models import Edition
 
-_QUOTED_ROWS: Final = Path(__file__).parents[1] / "editions" / "published"
 _ARXIV: Final = re.compile(
     r"https?://(?:www\.)?arxiv\.org/(?:abs|pdf)/([0-9]{4}\.[0-9]{4,5})(?:v[0-9]+)?(?:\.pdf)?"
 )
@@ -23,47 +21,30 @@ _IN_ADDRESSES: Final = {character: f"%{ord(character):02X}" for character in '{}
 
 
 def references(entries: Iterable[Entry], *, of_board: str = "") -> Iterator[str]:
-    """Yield the benchmark's paper, the board itself, then one entry for each further paper of a row.
+    """Yield the benchmark's paper if it has one, the board, then an entry for each further paper of a row.
 
     The note of a row marks one that others see differently.
     """
-    yield of_benchmark()
-    if of_board:
-        yield of_board
-    bibtex_by_key = {benchmark_key(): ""}
+    paper = settings.BENCHMARK.paper
+    yield from filter(None, (paper.bibtex_entry if paper else "", of_board))
+    bibtex_by_key = {paper.bibtex_key: ""} if paper else {}
     for entry in entries:
         if entry.withdrawn_at is None and (entry.source_title or entry.paper_url):
             bibtex_by_key.setdefault(key_of(entry), of_entry(entry))
     yield from filter(None, bibtex_by_key.values())
 
 
-@lru_cache(maxsize=1)
-def benchmark_source() -> dict[str, str]:
-    """Return title, authors, year and url of the benchmark's paper."""
-    path = _QUOTED_ROWS / "tsttc-2023.json"
-    source: dict[str, str] = json.loads(path.read_text(encoding="utf-8"))["source"]
-    return source
-
-
-def benchmark_key() -> str:
-    source = benchmark_source()
-    return _paper_key(source["authors"], source["year"], source["title"])
-
-
-def of_benchmark() -> str:
-    source = benchmark_source()
-    return _paper(benchmark_key(), source["title"], source["authors"], str(source["year"]), source["url"])
-
-
 def of_edition(edition: Edition, *, address: str, at: datetime | None) -> str:
     """Cite the board of an edition as of a time, at a permanent address."""
+    name = settings.BENCHMARK.site_name
+    site = latex(name)
     facts = [f"Protocol {edition.protocol}", f"ground truth {edition.ground_truth_id}"]
     facts += [f"as of {at.astimezone(UTC):%Y-%m-%d}"] if at else []
     return _entry(
-        f"tsttc-leaderboard-{_plain(edition.split_id)}-edition-{edition.number}",
+        f"{_plain(name)}-{_plain(edition.split_id)}-edition-{edition.number}",
         {
-            "title": f"{{TSTTC leaderboard: {latex(edition.split_id)}, edition {edition.number}}}",
-            "author": "{TSTTC leaderboard}",
+            "title": f"{{{site}: {latex(edition.split_id)}, edition {edition.number}}}",
+            "author": f"{{{site}}}",
             "year": f"{at.astimezone(UTC):%Y}" if at else "",
             **_address(address),
             "note": latex(", ".join(facts)),
@@ -74,6 +55,9 @@ def of_edition(edition: Edition, *, address: str, at: datetime | None) -> str:
 def key_of(entry: Entry) -> str:
     """Return the key: a published result's paper, or a method's name and the start of its id."""
     if entry.kind == "published":
+        paper = settings.BENCHMARK.paper
+        if paper and entry.source_title == paper.title:
+            return paper.bibtex_key
         return _paper_key(entry.team, entry.year or "", entry.source_title)
     name = _plain(entry.method)[:40].strip("-") or "method"
     return f"{name}-{entry.method_id.hex[:6] if entry.method_id else ''}"
@@ -92,7 +76,7 @@ def of_entry(entry: Entry, *, page: str = "") -> str:
             "author": f"{{{latex(entry.team)}}}",
             "year": f"{entry.date:%Y}" if entry.date else "",
             **_address(entry.paper_url or page),
-            "note": layouts.marked("TSTTC leaderboard", mark),
+            "note": layouts.marked(latex(settings.BENCHMARK.site_name), mark),
         },
     )
 

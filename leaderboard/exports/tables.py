@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+from django.conf import settings
+
 from evaluator.scoring.results import format_rounded
 from evaluator.tables import layouts
 from evaluator.tables.layouts import Export
@@ -77,6 +79,7 @@ def _origin(board: Board, *, address: str) -> layouts.Origin:
     edition = board.edition
     truth = edition.ground_truth if edition else None
     return layouts.Origin(
+        site=settings.BENCHMARK.site_name,
         split=board.split.pk,
         address=address,
         edition=edition.number if edition else None,

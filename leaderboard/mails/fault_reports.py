@@ -32,7 +32,7 @@ class FaultReportHandler(logging.Handler):
             mail = Mail(
                 kind=MailKind.ACCOUNT,
                 recipient=address,
-                subject=f"[{settings.SITE_NAME}] An error on the site",
+                subject=f"[{settings.BENCHMARK.site_name}] An error on the site",
                 text=line[:_MAX_CHARACTERS],
                 key=f"error:{digest[:60]}",
                 queued_at=now,

@@ -165,8 +165,9 @@ def has_sent_to(split: Split) -> Exists:
 
 def framed(*, subject: str, text: str) -> tuple[str, str]:
     """Frame subject and text with the site's name and the link to switch notices off."""
-    footer = f"--\n{settings.SITE_NAME}\n{settings.SITE_URL}\nChoose which mails you get: {_link('mails')}"
-    return f"[{settings.SITE_NAME}] {subject}", f"{text}\n\n{footer}\n"
+    name = settings.BENCHMARK.site_name
+    footer = f"--\n{name}\n{settings.SITE_URL}\nChoose which mails you get: {_link('mails')}"
+    return f"[{name}] {subject}", f"{text}\n\n{footer}\n"
 
 
 def _mail(kind: MailKind, user: User, *, key: str, subject: str, text: str, now: datetime) -> Mail:

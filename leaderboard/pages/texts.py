@@ -58,7 +58,7 @@ def versions(name: str) -> list[PageVersion]:
 def default_text(name: str) -> str:
     """Render the default text with this site's names and limits."""
     facts = {
-        "site_name": settings.SITE_NAME,
+        "benchmark": settings.BENCHMARK,
         "site_url": settings.SITE_URL,
         "contact": settings.CONTACT_EMAIL,
         "session_days": settings.SESSION_COOKIE_AGE // 86_400,

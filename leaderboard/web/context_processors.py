@@ -1,4 +1,4 @@
-"""Context of every page: the site's name, the section, and the splits."""
+"""Context of every page: the benchmark, the section, and the splits."""
 
 from typing import Any
 
@@ -39,7 +39,7 @@ def _board_split(request: HttpRequest) -> str:
 def site(request: HttpRequest) -> dict[str, Any]:
     # Lazy: only some pages list the splits.
     return {
-        "site_name": settings.SITE_NAME,
+        "benchmark": settings.BENCHMARK,
         "site_url": settings.SITE_URL,
         "section": _section(request),
         # Those that people can sign in with: the word in addresses, and the name that people know.

@@ -2,6 +2,7 @@
 
 import sys
 
+from django.conf import settings
 from django.http import HttpRequest, HttpResponse, HttpResponseServerError
 from django.template.loader import render_to_string
 from django.views import defaults
@@ -22,8 +23,8 @@ def server_error(request: HttpRequest) -> HttpResponse:
     if request.path.startswith("/api/"):
         return problem_codes.response(status=status, code=code, detail=sentence, headers=headers)
     if outage is None:
-        return HttpResponseServerError(render_to_string("500.html"))
-    page = render_to_string("outage.html", {"outage": outage})
+        return HttpResponseServerError(render_to_string("500.html", {"benchmark": settings.BENCHMARK}))
+    page = render_to_string("outage.html", {"outage": outage, "benchmark": settings.BENCHMARK})
     return HttpResponse(page, status=outage.status, headers=outage.headers)
 
 

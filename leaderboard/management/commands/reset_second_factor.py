@@ -23,7 +23,8 @@ class Command(AccountCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         user = account_of(options)
         event = second_factor.reset(user=user, reason=options["reason"])
-        text = _MAIL.format(contact=settings.CONTACT_EMAIL, site=settings.SITE_URL, name=settings.SITE_NAME)
+        name = settings.BENCHMARK.site_name
+        text = _MAIL.format(contact=settings.CONTACT_EMAIL, site=settings.SITE_URL, name=name)
         mail = outbox.tell(
             kind=MailKind.ACCOUNT,
             user=user,

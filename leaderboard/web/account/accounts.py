@@ -37,7 +37,7 @@ class ConfiguredSite(RequestSite):
     """The site of the settings, whatever `Host` a request names."""
 
     def __init__(self) -> None:
-        self.name = settings.SITE_NAME
+        self.name = settings.BENCHMARK.site_name
         self.domain = urlsplit(settings.SITE_URL).netloc
         self.url = settings.SITE_URL
 
@@ -194,7 +194,7 @@ class SecondFactorAdapter(DefaultMFAAdapter):
     }
 
     def get_totp_issuer(self) -> str:
-        return str(settings.SITE_NAME)
+        return settings.BENCHMARK.site_name
 
     def can_delete_authenticator(self, authenticator: Authenticator) -> bool:
         return not (settings.REQUIRE_SECOND_FACTOR and authenticator.user.is_maintainer)

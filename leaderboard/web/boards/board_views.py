@@ -18,9 +18,6 @@ from leaderboard.web.boards.board_query import BoardQuery, tools
 from leaderboard.web.boards.rank_ladder import rank_ladder
 from leaderboard.web.lookups import split_or_404
 
-MAIN_SPLIT = "test"
-"""The split whose board papers quote."""
-
 
 @require_safe
 def board(request: HttpRequest, split: str) -> HttpResponse:

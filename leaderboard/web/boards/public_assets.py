@@ -12,19 +12,18 @@ from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.exports import badges, feeds
 from leaderboard.models import Method
-from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.lookups import split_or_404
 
 
 @require_safe
 def badge(request: HttpRequest, method_id: UUID) -> HttpResponse:
     """Draw rank and score of a method on `?split=`."""
-    split = split_or_404(request, request.GET.get("split") or MAIN_SPLIT)
+    split = split_or_404(request, request.GET.get("split") or settings.BENCHMARK.default_split)
     entries = snapshots.board(split=split, viewer=AnonymousUser()).entries
     entry = next((entry for entry in entries if entry.method_id == method_id), None)
     if entry is None and not Method.objects.shown().filter(pk=method_id).exists():
         raise Http404("There is no such method.")
-    drawn = badges.svg(label=f"TSTTC {split.pk}", text=badges.words(entry))
+    drawn = badges.svg(label=f"{settings.BENCHMARK.name} {split.pk}", text=badges.words(entry))
     # Browsers show it on the pages of others, which they may not do with anything else of here.
     others = {"Cross-Origin-Resource-Policy": "cross-origin"}
     return HttpResponse(drawn, content_type="image/svg+xml", headers=others)
@@ -41,7 +40,7 @@ def feed(request: HttpRequest, split: str = "") -> HttpResponse:
             for entry in shown.entries
             if feeds.is_news(entry)
         ),
-        title=f"{settings.SITE_NAME}{where}, new entries",
+        title=f"{settings.BENCHMARK.site_name}{where}, new entries",
         address=settings.SITE_URL + request.path,
         page=settings.SITE_URL + (reverse("board", args=[split]) if split else reverse("home")),
     )

@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from typing import Final
 
+from django.conf import settings
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import render
 from django.views.decorators.gzip import gzip_page
@@ -118,6 +119,8 @@ DOWNLOADS: Final = tuple(each for each in FORMATS if each.name in {"csv", "latex
 @gzip_page
 @require_safe
 def published_page(request: HttpRequest) -> HttpResponse:
+    if not settings.BENCHMARK.has_paper_tables:
+        raise Http404("This benchmark has no tables of a paper.")
     shown = [{"shown": each, "chart": sweep(each)} for each in published.printed_tables()]
     context = {"tables": shown, "source": published_tables().source, "downloads": DOWNLOADS}
     return render(request, "charts/published.html", context)
@@ -126,7 +129,8 @@ def published_page(request: HttpRequest) -> HttpResponse:
 @require_safe
 def published_table(request: HttpRequest, table_name: str, suffix: str) -> HttpResponse:
     chosen = next((each for each in DOWNLOADS if each.suffix == suffix), None)
-    table = next((each for each in published_tables().tables if each.name == table_name), None)
+    tables = published_tables().tables if settings.BENCHMARK.has_paper_tables else ()
+    table = next((each for each in tables if each.name == table_name), None)
     if chosen is None or table is None:
         raise Http404(f"There is no table {table_name}.{suffix}.")
     return HttpResponse(

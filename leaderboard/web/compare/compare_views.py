@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+from django.conf import settings
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import render
 from django.utils import timezone
@@ -13,7 +14,6 @@ from leaderboard.http_caching import cacheable
 from leaderboard.models import Split
 from leaderboard.ops import rate_limits
 from leaderboard.statistics import analyses, comparisons, questions
-from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.compare import compare_tables
 from leaderboard.web.compare.contact_lens import contact_lens
 
@@ -29,7 +29,7 @@ class UnknownSplit(comparisons.BadComparison):
 @require_safe
 def compare(request: HttpRequest) -> HttpResponse:
     """Show two to five methods of one board and their differences, or the choice of them."""
-    wanted, name = request.GET.getlist("m"), request.GET.get("split") or MAIN_SPLIT
+    wanted, name = request.GET.getlist("m"), request.GET.get("split") or settings.BENCHMARK.default_split
     splits = splits_of(request)
     split = next((split for split in splits if split.pk == name), None)
     try:

@@ -18,7 +18,7 @@ from leaderboard.pages import texts
 from leaderboard.web.docs import api_examples, guides
 
 # Public pages that are about no board.
-_NAMED: Final = ("home", "published", "docs", "api_reference")
+_NAMED: Final = ("home", "docs", "api_reference")
 # Pages of one's own, and views of a page that the page itself offers: its orders, filters and days.
 _NOT_FOR_CRAWLERS: Final = (
     "/account/",
@@ -53,6 +53,7 @@ def sitemap(request: HttpRequest) -> HttpResponse:
     # Private and anonymous methods and withdrawn rows are left out.
     fixed = [
         *map(_absolute, _NAMED),
+        *([_absolute("published")] if settings.BENCHMARK.has_paper_tables else []),
         *(_absolute("site_page", name) for name in texts.PAGES),
         *(_absolute("guide", name) for name in guides.files()),
         *(_absolute("api_operation", name) for name in api_examples.EXAMPLES),

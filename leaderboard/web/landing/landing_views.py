@@ -5,6 +5,7 @@ from datetime import datetime
 from typing import Any
 from urllib.parse import urlencode
 
+from django.conf import settings
 from django.contrib.auth.models import AnonymousUser
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseRedirect
 from django.shortcuts import render
@@ -14,11 +15,9 @@ from django.views.decorators.http import require_safe
 
 from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import splits_of
-from leaderboard.exports import bibtex
 from leaderboard.models import Split, User
 from leaderboard.quotas import admissions
 from leaderboard.web.boards import board_query
-from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.charts import chart_views
 from leaderboard.web.landing.leaders import lead_words, leaders
 from leaderboard.web.landing.news import latest
@@ -29,13 +28,9 @@ from leaderboard.web.submissions.forms import offers_for
 def home(request: HttpRequest) -> HttpResponse:
     splits = splits_of(request)
     main = main_split(splits)
-    source = bibtex.benchmark_source()
     context = {
         "dates": _dates(splits, reader=request.user, now=timezone.now()),
         "news": latest(splits),
-        "citation": bibtex.of_benchmark(),
-        "source": source,
-        "authors": [name.strip() for name in source["authors"].split(",")],
         "board_split": main.pk if main else "",
     }
     return render(request, "landing/home.html", context | (_leading(main) if main else {}))
@@ -53,8 +48,9 @@ def main_board(request: HttpRequest) -> HttpResponse:
 
 
 def main_split(splits: Sequence[Split]) -> Split | None:
-    """Return the split whose numbers papers quote, else the first."""
-    return next((split for split in splits if split.pk == MAIN_SPLIT), next(iter(splits), None))
+    """Return the benchmark's first board, else the first split."""
+    name = settings.BENCHMARK.default_split
+    return next((split for split in splits if split.pk == name), next(iter(splits), None))
 
 
 def _dates(

@@ -145,4 +145,9 @@ def test_search_engines_learn_what_the_dataset_is(client: Client, benchmark: Non
         "TSTTC",
     )
     assert dataset["creator"][0] == {"@type": "Person", "name": "Yuheng Shi"}
-    assert "Test, Validation, Demo" in dataset["description"]
+    assert [part["name"] for part in dataset["hasPart"]] == [
+        "TSTTC, Test",
+        "TSTTC, Validation",
+        "TSTTC, Demo",
+    ]
+    assert dataset["hasPart"][1]["url"].endswith("/board/val/")
