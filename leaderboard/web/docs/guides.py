@@ -44,6 +44,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
     "For maintainers": {
         "Quick start": "maintainers",
         "Operations": "operations",
+        "Host another dataset": "another-dataset",
         "How far one machine goes": "capacity",
         "Who may do what": "access",
         "Security": "security",
