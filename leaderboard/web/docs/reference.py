@@ -12,7 +12,6 @@ from evaluator.problems import PROBLEM_CODES
 from leaderboard.boards import listing
 from leaderboard.models import Split
 from leaderboard.quotas import admissions
-from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.formatting import size
 
 # What only maintainers meet, when they import ground truth.
@@ -49,7 +48,9 @@ def _follows_toolkit(protocol: Protocol) -> bool:
 def docs(splits: Sequence[Split], *, now: datetime) -> dict[str, Any]:
     example = example_split(splits, now=now)
     # The board that is quoted; without it the first.
-    main = next((split for split in splits if split.pk == MAIN_SPLIT), next(iter(splits), None))
+    main = next(
+        (split for split in splits if split.pk == settings.BENCHMARK.default_split), next(iter(splits), None)
+    )
     protocol = listing.rules_of(main.current_edition if main else None)
     ends = [end for each in protocol.ranges for end in each.closed_ends]
     return {
