@@ -1,4 +1,4 @@
-"""Predictions in a Parquet table, converted to JSON on the participant's machine (ADR 8). Needs pyarrow."""
+"""Predictions in a Parquet table, converted to JSON on the participant's machine (ADR 7). Needs pyarrow."""
 
 from __future__ import annotations
 
