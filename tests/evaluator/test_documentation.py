@@ -41,11 +41,13 @@ def test_every_problem_has_its_line() -> None:
     lines = dict(
         re.findall(r"^\| `([a-z0-9-]+)` \| (.*) \|$", FORMAT.partition("\n## Problems\n")[2], re.MULTILINE)
     )
-    assert lines == PROBLEM_CODES
+    assert lines == PROBLEM_CODES, "give each its line in docs/file-format.md, under Problems"
 
 
 def test_every_protocol_and_interval_is_described() -> None:
-    assert [name for name in PROTOCOLS if f"`{name}`" not in SCORING] == []
+    assert [name for name in PROTOCOLS if f"`{name}`" not in SCORING] == [], (
+        "describe them in docs/scoring.md"
+    )
     for ttc_range in TTC_RANGES:
         low, high = (f"{value:g}".replace("-", "−") for value in (ttc_range.low_s, ttc_range.high_s))
         assert ttc_range.name in SCORING

@@ -97,7 +97,8 @@ elsewhere = (st.floats(0.05) | st.floats(max_value=-0.15)).filter(lambda value: 
 @given(predicted_s=st.lists(elsewhere, min_size=1, max_size=20))
 def test_both_protocols_agree_exactly_away_from_zero(predicted_s: list[float]) -> None:
     truth = make_truth(np.linspace(1, 19, len(predicted_s)))
-    board, toolkit = (evaluate(given_values(truth, predicted_s), truth, protocol=name) for name in PROTOCOLS)
+    given_predictions = given_values(truth, predicted_s)
+    board, toolkit = (evaluate(given_predictions, truth, protocol=name) for name in ("tsttc-1", "toolkit"))
     assert board.scores == toolkit.scores
 
 
@@ -138,7 +139,7 @@ def test_the_toolkits_protocol_refuses_exactly_where_the_ratio_is_not_positive_a
 
 
 def test_an_unknown_protocol_is_an_error_of_the_caller() -> None:
-    with pytest.raises(ValueError, match=r"Unknown protocol 'x'; expected one of tsttc-1, toolkit\."):
+    with pytest.raises(ValueError, match=rf"Unknown protocol 'x'; expected one of {', '.join(PROTOCOLS)}\."):
         scored([4.0], [4.0], protocol="x")
 
 

@@ -10,6 +10,7 @@ from django.test import Client
 from leaderboard.boards import filters, listing
 from leaderboard.errors.refusals import Refused
 from leaderboard.methods import editing
+from leaderboard.methods.details import DETAILS
 from leaderboard.models import AuditEvent, BoardVersion, Edition, Method, Split, Submission, User
 from tests import builders, pages
 
@@ -20,15 +21,12 @@ WHOLE: dict[str, Any] = {
     "description": "What it does.",
     "paper_url": "https://example.org/paper",
     "code_url": "https://example.org/code",
-    "n_frames": 6,
-    "cameras": "ONE",
-    "box_source": "GIVEN",
-    "uses_nerf": False,
+    **{detail.name: detail.example for detail in DETAILS},
+    # What tests below name.
     "uses_extra_data": True,
     "pretraining": "ImageNet-1k",
     "n_parameters": 31_000_000,
     "latency_ms": 41.5,
-    "hardware": "one GPU",
 }
 
 

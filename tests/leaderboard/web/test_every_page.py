@@ -13,6 +13,7 @@ from pytest_django import Settings
 
 from evaluator.problems import PROBLEM_CODES
 from leaderboard.models import Edition, User
+from leaderboard.pages.texts import PAGES
 from leaderboard.web.docs import reference
 from tests import builders, pages
 
@@ -31,11 +32,7 @@ PUBLIC = [
     "/docs/decisions/",
     "/docs/search/",
     "/docs/search/?q=quota",
-    "/rules/",
-    "/contact/",
-    "/privacy/",
-    "/imprint/",
-    "/licence/",
+    *(f"/{name}/" for name in PAGES),
     "/accounts/login/",
     "/accounts/login/?next=/submit/",
     "/accounts/signup/",

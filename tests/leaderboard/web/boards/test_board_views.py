@@ -7,6 +7,7 @@ import pytest
 from django.test import Client
 
 from evaluator import SCORE_NAMES
+from evaluator.metrics.protocol import known_metrics
 from leaderboard.models import Method, Submission, User, Visibility
 from tests import builders, pages
 from tests.leaderboard.web.boards.test_board import MID, row_of
@@ -126,7 +127,10 @@ def test_filters_that_nothing_fits_leave_a_sentence_and_a_way_back(
 @pytest.mark.parametrize(
     ("query", "sentence"),
     [
-        ("columns=all", "The board has no columns 'all'; expected one of both, mid, rte."),
+        (
+            "columns=all",
+            f"The board has no columns 'all'; expected one of {', '.join(['both', *known_metrics()])}.",
+        ),
         ("page=0", "The board has no page '0'; expected a number from 1 on."),
         ("page=٣", "expected a number from 1 on"),
         ("sort=<script>", "cannot be sorted by"),
