@@ -1,7 +1,7 @@
 """A person's data: their own export, and the deletion of what names them. Scores and files stay."""
 
 from datetime import datetime
-from typing import Any
+from typing import Any, Final
 
 from allauth.account.models import EmailAddress
 from allauth.mfa.models import Authenticator
@@ -29,6 +29,8 @@ from leaderboard.quotas import mailboxes
 
 # Addresses below it exist nowhere (RFC 2606).
 NOWHERE = "forgotten.invalid"
+# The fields of a submission that a person has typed, or named a file.
+_TEXTS: Final = ("filename", "note", "commit")
 
 
 def export(*, user: User) -> dict[str, Any]:
@@ -55,8 +57,7 @@ def export(*, user: User) -> dict[str, Any]:
                 "split": row.split_id,
                 "method_id": str(row.method_id),
                 "method": names[row.method_id],
-                "filename": row.filename,
-                "note": row.note,
+                **{name: getattr(row, name) for name in _TEXTS},
                 "digest": row.digest,
                 "size_bytes": row.size_bytes,
                 "submitted_at": _moment(row.submitted_at),
@@ -163,7 +164,7 @@ def _blank(user: User) -> None:
     # Sessions rest on the password: they all end with it.
     user.set_unusable_password()
     user.save(update_fields=["email", "name", "muted_kinds", "is_active", "last_login", "password"])
-    Submission.objects.filter(submitted_by=user).update(filename="", note="")
+    Submission.objects.filter(submitted_by=user).update(**dict.fromkeys(_TEXTS, ""))
     audit.blank(AuditText.objects.filter(Q(actor=user) | Q(noun="User", noun_id=str(user.pk))))
 
 

@@ -7,6 +7,7 @@ from allauth.account.models import EmailAddress
 from allauth.mfa.models import Authenticator
 from allauth.socialaccount.models import SocialAccount
 from django.core import serializers
+from django.db.models import CharField, TextField
 from django.test import Client
 from django.utils import timezone
 
@@ -197,6 +198,18 @@ def test_a_forgotten_person_is_named_nowhere_and_their_scores_stay(
     assert "Lovelace" not in board
     assert client.get("/submissions/").status_code == 302  # the session has ended
     assert not Membership.objects.filter(user=owner).exists()
+
+
+def test_every_text_of_a_submission_is_exported_and_forgotten(edition: Edition, owner: User) -> None:
+    submission = builders.submit(owner, builders.predictions(edition))
+    fields = [field for field in Submission._meta.get_fields() if isinstance(field, CharField | TextField)]
+    texts = dict.fromkeys((field.name for field in fields if field.blank), "by ada")
+    Submission.objects.filter(pk=submission.pk).update(**texts)
+    [row] = forgetting.export(user=owner)["submissions"]
+    message = "name it in leaderboard/moderation/forgetting.py"
+    assert {name: row.get(name) for name in texts} == texts, message
+    forgetting.forget(user=owner, reason="R", actor=owner, now=timezone.now())
+    assert Submission.objects.filter(**dict.fromkeys(texts, "")).exists(), message
 
 
 def test_a_team_goes_on_without_its_owner(team: Team, owner: User, teammate: User) -> None:
