@@ -4,7 +4,7 @@ from allauth.account.decorators import secure_admin_login
 from django.contrib import admin
 from django.urls import include, path, re_path
 
-from leaderboard.api.exceptions import NowhereView
+from leaderboard.api.exceptions import UnknownAddressView
 from leaderboard.web import monitoring
 from leaderboard.web.account import providers
 from leaderboard.web.submissions import submission_views
@@ -15,7 +15,7 @@ admin.site.login = secure_admin_login(admin.site.login)  # type: ignore[method-a
 urlpatterns = [
     path("", include("leaderboard.web.urls")),
     path("api/v1/", include("leaderboard.api.urls")),
-    re_path(r"^api(/|$)", NowhereView.as_view()),
+    re_path(r"^api(/|$)", UnknownAddressView.as_view()),
     path(".well-known/tsttc-receipt-keys.json", submission_views.receipt_keys, name="receipt_keys"),
     path("accounts/", include("allauth.account.urls")),
     path("accounts/2fa/", include("allauth.mfa.urls")),

@@ -17,7 +17,7 @@ from evaluator.cli.paths import keep_server_of_login, server_of_login
 from evaluator.cli.tokens import account, checked, forget_token, keep_token
 
 if TYPE_CHECKING:
-    from evaluator.client.answers import Foreseen, Quota
+    from evaluator.client.answers import Quota, VisibilityPreview
 
 N_MOVED_SHOWN = 5  # rows whose rank changes; the first show what the others do
 
@@ -155,7 +155,9 @@ def publish(
                 code="unknown-method",
             )
         if not yes:
-            _confirm(own_method.name, visibility, client.foreseen(own_method.id, visibility.upper()))
+            _confirm(
+                own_method.name, visibility, client.visibility_preview(own_method.id, visibility.upper())
+            )
         shown = client.show_method(own_method.id, visibility.upper(), reveal_at=reveal_at)
     if as_json:
         echo_json(shown.document)
@@ -166,8 +168,8 @@ def publish(
     click.echo(printable(f"{own_method.name} is {visibility} now{called}{until}{address}"))
 
 
-def _confirm(name: str, visibility: str, foreseen: Foreseen) -> None:
-    for line in _foreseen_in_words(foreseen):
+def _confirm(name: str, visibility: str, preview: VisibilityPreview) -> None:
+    for line in _preview_in_words(preview):
         click.echo(line, err=True)
     meaning = {
         "public": "with its name, team and scores; this cannot be undone",
@@ -180,37 +182,37 @@ def _confirm(name: str, visibility: str, foreseen: Foreseen) -> None:
             exit_code=Exit.USAGE,
             code="not-confirmed",
             hint="Nothing was changed. Use --yes to confirm.",
-            more={"preview": foreseen.document},
+            more={"preview": preview.document},
         )
     click.echo(words, err=True)
     if not click.confirm("Publish?", err=True):
         raise Failure("Nothing was changed.", exit_code=Exit.USAGE, code="not-confirmed")
 
 
-def _foreseen_in_words(foreseen: Foreseen) -> Iterator[str]:
+def _preview_in_words(preview: VisibilityPreview) -> Iterator[str]:
     from evaluator.cli.values import overall_of, texts_of  # noqa: PLC0415 -- others here need no scores
 
-    yield printable(f"Everyone will see {foreseen.name}, team {foreseen.team}:")
-    errors = overall_of(name for sight in foreseen.splits for name in sight.after.scores)
+    yield printable(f"Everyone will see {preview.name}, team {preview.team}:")
+    errors = overall_of(name for board in preview.splits for name in board.after.scores)
     headings = ("split", "rank", "of", *map(short_name, errors), "now")
     table = [[Cell(text, is_bold=True) for text in headings]]
-    for sight in foreseen.splits:
-        ranks = [NO_VALUE if rank is None else f"{rank:,}" for rank in (sight.after.rank, sight.n_ranked)]
-        values = texts_of(sight.after, missing=NO_VALUE, scores=errors)
-        now = f"visible as {sight.before.method}" if sight.before else "not visible"
-        table.append([Cell(printable(text)) for text in (sight.split, *ranks, *values, now)])
-    if foreseen.splits:
+    for board in preview.splits:
+        ranks = [NO_VALUE if rank is None else f"{rank:,}" for rank in (board.after.rank, board.n_ranked)]
+        values = texts_of(board.after, missing=NO_VALUE, scores=errors)
+        now = f"visible as {board.before.method}" if board.before else "not visible"
+        table.append([Cell(printable(text)) for text in (board.split, *ranks, *values, now)])
+    if preview.splits:
         yield from aligned(table, align=f"<>>{'.' * len(errors)}<")
     else:
         yield "The method has no scored submission on a board yet."
-    for sight in foreseen.splits:
-        if sight.moved:
+    for board in preview.splits:
+        if board.moved:
             moves = [
-                f"{row.method} {row.rank_before} to {row.rank_after}" for row in sight.moved[:N_MOVED_SHOWN]
+                f"{row.method} {row.rank_before} to {row.rank_after}" for row in board.moved[:N_MOVED_SHOWN]
             ]
-            rest = len(sight.moved) - len(moves)
+            rest = len(board.moved) - len(moves)
             more = f", and {rest:,} more" if rest else ""
-            yield printable(f"On {sight.split} other ranks change: {', '.join(moves)}{more}.")
+            yield printable(f"On {board.split} other ranks change: {', '.join(moves)}{more}.")
     yield ""
 
 

@@ -164,7 +164,7 @@ class BoardPreview(msgspec.Struct, frozen=True, kw_only=True):
     moved: list[RankChange] = []
 
 
-class Foreseen(msgspec.Struct, frozen=True, kw_only=True):
+class VisibilityPreview(msgspec.Struct, frozen=True, kw_only=True):
     """A preview of a method's public rows."""
 
     name: str

@@ -27,13 +27,13 @@ from evaluator.client.answers import (
     BadAnswer,
     Board,
     Compared,
-    Foreseen,
     Method,
     Quota,
     Refused,
     Submission,
     TimedOut,
     Unreachable,
+    VisibilityPreview,
 )
 from evaluator.client.exchange import (
     PASSING_STATUSES,
@@ -224,9 +224,9 @@ class Client:
         """Fetch a method as this account may see it."""
         return self._get(Method, "methods", method_id)
 
-    def foreseen(self, method_id: str, visibility: str) -> Foreseen:
+    def visibility_preview(self, method_id: str, visibility: str) -> VisibilityPreview:
         """Preview what everyone would see of an own method if it were "PUBLIC" or "ANONYMOUS"."""
-        return self._get(Foreseen, "methods", method_id, "visibility", params={"as": visibility})
+        return self._get(VisibilityPreview, "methods", method_id, "visibility", params={"as": visibility})
 
     def show_method(self, method_id: str, visibility: str, *, reveal_at: str | None = None) -> Method:
         """Publish a method as "PUBLIC" or, until `reveal_at`, "ANONYMOUS", for good."""

@@ -100,7 +100,7 @@ def _domain_error(exc: Exception) -> Response | None:
         case Refused():
             status = REFUSED_STATUS.get(exc.code, 422)
             return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
-        case usage.QuotaExceeded() | questions.AskedTooOften():
+        case usage.QuotaExceeded() | questions.TooManyComparisons():
             return _not_yet(exc)
         case filters.BadFilter():
             return problem(status=400, code="bad-filter", detail=str(exc), where=exc.field)
@@ -110,7 +110,7 @@ def _domain_error(exc: Exception) -> Response | None:
     return problem(status=status, code=code, detail=str(exc), where=where)
 
 
-def _not_yet(exc: usage.QuotaExceeded | questions.AskedTooOften) -> Response:
+def _not_yet(exc: usage.QuotaExceeded | questions.TooManyComparisons) -> Response:
     if isinstance(exc, usage.QuotaExceeded):
         retry_after_s = exc.quota.retry_after_s(now=timezone.now())
     else:
@@ -162,7 +162,7 @@ def _sentence(exc: Exception) -> str:
     return text if text.endswith(".") else f"{text}."
 
 
-class NowhereView(APIView):
+class UnknownAddressView(APIView):
     """Answers other paths below /api/ by a 404 as a problem document."""
 
     permission_classes = [AllowAny]

@@ -111,7 +111,7 @@ class MethodChangesSerializer(serializers.Serializer[Any]):
         return fields
 
 
-class MovedSerializer(serializers.Serializer[RankChange]):
+class RankChangeSerializer(serializers.Serializer[RankChange]):
     """Another row of the board whose rank would change."""
 
     method = serializers.CharField(source="entry.method", help_text="Name of the method.")
@@ -120,7 +120,7 @@ class MovedSerializer(serializers.Serializer[RankChange]):
     rank_after = serializers.IntegerField(allow_null=True, help_text="Rank after the publication.")
 
 
-class SightSerializer(serializers.Serializer[BoardPreview]):
+class BoardPreviewSerializer(serializers.Serializer[BoardPreview]):
     """The public board of one split as it would be."""
 
     split = serializers.CharField(source="split.name", help_text=SPLIT)
@@ -133,10 +133,10 @@ class SightSerializer(serializers.Serializer[BoardPreview]):
         allow_null=True,
         help_text="Current attempts in the team's other public rows; null: it has none.",
     )
-    moved = MovedSerializer(many=True, help_text="Other rows whose ranks would change, in board order.")
+    moved = RankChangeSerializer(many=True, help_text="Other rows whose ranks would change, in board order.")
 
 
-class ForeseenSerializer(serializers.Serializer[VisibilityPreview]):
+class VisibilityPreviewSerializer(serializers.Serializer[VisibilityPreview]):
     """What everybody would see of a method. The request changes nothing."""
 
     visibility = serializers.ChoiceField(
@@ -150,10 +150,10 @@ class ForeseenSerializer(serializers.Serializer[VisibilityPreview]):
     paper_url = serializers.CharField(source="profile.paper_url", allow_blank=True, help_text=PAPER_URL)
     code_url = serializers.CharField(source="profile.code_url", allow_blank=True, help_text=CODE_URL)
     details = DetailsSerializer(source="profile.details", help_text=DETAILS)
-    splits = SightSerializer(source="sights", many=True, help_text="Boards on which it has a row.")
+    splits = BoardPreviewSerializer(source="boards", many=True, help_text="Boards on which it has a row.")
 
 
-class ShowSerializer(serializers.Serializer[Any]):
+class VisibilityChangeSerializer(serializers.Serializer[Any]):
     """A method's new visibility."""
 
     visibility = serializers.ChoiceField(
@@ -233,9 +233,9 @@ class VisibilityView(APIView):
     parser_classes = [LimitedJSONParser]
 
     @extend_schema(
-        operation_id="foresee_method",
+        operation_id="preview_visibility",
         parameters=[AS],
-        responses={200: ForeseenSerializer, **errors(400, 404, 422)},
+        responses={200: VisibilityPreviewSerializer, **errors(400, 404, 422)},
     )
     def get(self, request: Request, method_id: UUID) -> Response:
         """Preview the publication of your method: its public rows, and the ranks that would change."""
@@ -244,12 +244,12 @@ class VisibilityView(APIView):
         if wanted not in (Visibility.ANONYMOUS, Visibility.PUBLIC):
             raise BadValue("bad-visibility", "as", wanted, "ANONYMOUS or PUBLIC")
         visibility.require_possible(method, visibility=wanted, reveal_at=None, now=now)
-        foreseen = visibility_preview.preview(method=method, visibility=wanted, now=now)
-        return Response(ForeseenSerializer(foreseen).data)
+        preview = visibility_preview.preview(method=method, visibility=wanted, now=now)
+        return Response(VisibilityPreviewSerializer(preview).data)
 
     @extend_schema(
         operation_id="show_method",
-        request=ShowSerializer,
+        request=VisibilityChangeSerializer,
         responses={200: MethodSerializer, **errors(404, 422)},
     )
     def post(self, request: Request, method_id: UUID) -> Response:

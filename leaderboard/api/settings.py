@@ -32,7 +32,7 @@ SPECTACULAR_SETTINGS: Final[dict[str, Any]] = {
     # One set of choices that several answers have is one thing, under one name.
     "ENUM_NAME_OVERRIDES": {
         "MethodVisibilityEnum": "leaderboard.models.methods.Visibility",
-        "ShowVisibilityEnum": ["ANONYMOUS", "PUBLIC"],
+        "NewVisibilityEnum": ["ANONYMOUS", "PUBLIC"],
     },
     "POSTPROCESSING_HOOKS": [
         "drf_spectacular.hooks.postprocess_schema_enums",

@@ -109,7 +109,7 @@ def _submission_request(request: Request, form: QueryDict, *, now: datetime) -> 
     return intake.SubmissionRequest(
         user=user,
         split_name=str(form.get("split", "")),
-        method_name=editing.name_meant(user=user, text=str(form.get("method", ""))),
+        method_name=editing.method_name_of(user=user, text=str(form.get("method", ""))),
         upload=upload,
         via=Submission.Via.API,
         now=now,

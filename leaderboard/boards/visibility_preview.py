@@ -36,7 +36,7 @@ class VisibilityPreview:
 
     visibility: str
     profile: Profile
-    sights: tuple[BoardPreview, ...]
+    boards: tuple[BoardPreview, ...]
 
 
 def preview(*, method: Method, visibility: str, now: datetime) -> VisibilityPreview:
@@ -46,7 +46,7 @@ def preview(*, method: Method, visibility: str, now: datetime) -> VisibilityPrev
     assuming_visible.shown_at = method.shown_at or now
     public_others = Method.objects.filter(team=method.team_id, visibility=Visibility.PUBLIC)
     others = set(public_others.exclude(pk=method.pk).values_list("pk", flat=True))
-    sights = []
+    boards = []
     splits = (
         Split.objects.shown().exclude(current_edition=None).select_related("current_edition__ground_truth")
     )
@@ -56,7 +56,7 @@ def preview(*, method: Method, visibility: str, now: datetime) -> VisibilityPrev
         entry = next((row for row in rows if row.method_id == method.pk), None)
         if entry is not None and edition is not None:
             before = listing.public_rows(split=split, edition=edition)
-            sights.append(
+            boards.append(
                 BoardPreview(
                     split=split,
                     edition=edition,
@@ -70,7 +70,7 @@ def preview(*, method: Method, visibility: str, now: datetime) -> VisibilityPrev
     return VisibilityPreview(
         visibility=visibility,
         profile=profile_of(assuming_visible, is_masked=visibility == Visibility.ANONYMOUS),
-        sights=tuple(sights),
+        boards=tuple(boards),
     )
 
 

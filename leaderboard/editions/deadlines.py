@@ -45,7 +45,7 @@ def parse(text: str, *, field: str = "") -> datetime:
     return there.pop()
 
 
-def written(moment: datetime | None) -> str:
+def formatted(moment: datetime | None) -> str:
     """Format a moment as `parse` reads it; empty without one."""
     return f"{moment.astimezone(UTC):%Y-%m-%d %H:%M} UTC" if moment else ""
 

@@ -28,7 +28,7 @@ class LabelChanges:
     recordings: Sequence[Mapping[str, object]]
 
 
-def look(*, split_name: str, path: Path) -> LabelChanges:
+def load(*, split_name: str, path: Path) -> LabelChanges:
     """Compare a ground truth with that of the board; keep nothing.
 
     Raises `evaluator.Rejected`, `Refused` if the split has no board, `OSError` if its values are not here.

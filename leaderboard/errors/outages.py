@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import structlog
 from django.db import InterfaceError, OperationalError
 
-from leaderboard.storage.files import StoreAway
+from leaderboard.storage.files import StoreUnavailable
 
 log = structlog.get_logger(__name__)
 
@@ -62,7 +62,7 @@ def outage_of(fault: BaseException | None) -> Outage | None:
         # The driver's own exception, which knows PostgreSQL's code.
         is_full = getattr(fault.__cause__, "sqlstate", None) == POSTGRESQL_DISK_FULL
         outage = STORAGE_FULL if is_full else DATABASE_AWAY
-    elif isinstance(fault, StoreAway):
+    elif isinstance(fault, StoreUnavailable):
         outage = STORE_AWAY
     elif isinstance(fault, OSError) and fault.errno in FULL:
         outage = STORAGE_FULL

@@ -33,14 +33,14 @@ class Announcement:
         return f"announcement:{self.split.pk}:{digest[:16]}:{user_id}"
 
 
-def written(*, split: Split, subject: str, text: str) -> Announcement:
+def cleaned(*, split: Split, subject: str, text: str) -> Announcement:
     """Check an announcement. Raises `Refused` for what is empty or too long."""
     subject = " ".join(clean_text("subject", subject, limit=MAX_SUBJECT).split())
     text = clean_text("text", text.replace("\r\n", "\n"), limit=MAX_TEXT)
     return Announcement(split, subject, text)
 
 
-def left(announcement: Announcement) -> list[User]:
+def recipients(announcement: Announcement) -> list[User]:
     """Return users who want announcements, whose team sent a file, and who have not got this one."""
     people = notices.readers(MailKind.ANNOUNCEMENT).filter(notices.has_sent_to(announcement.split))
     keys = {user: announcement.key(user.pk) for user in people}
@@ -55,11 +55,11 @@ def announce(announcement: Announcement, *, now: datetime, actor: User | None) -
         split = Split.objects.select_for_update(no_key=True).filter(pk=announcement.split.pk).first()
         if split is None:
             raise Refused("unknown-split", f"There is no split {announcement.split.pk!r} any more.")
-        people = left(announcement)
+        people = recipients(announcement)
         subject, text = announcement.mailed
         outbox.queue(
             [
-                outbox.tell(
+                outbox.notice(
                     kind=MailKind.ANNOUNCEMENT,
                     user=user,
                     key=announcement.key(user.pk),

@@ -172,7 +172,7 @@ def framed(*, subject: str, text: str) -> tuple[str, str]:
 
 def _mail(kind: MailKind, user: User, *, key: str, subject: str, text: str, now: datetime) -> Mail:
     subject, text = framed(subject=subject, text=text)
-    return outbox.tell(kind=kind, user=user, key=f"{key}:{user.pk}", subject=subject, text=text, now=now)
+    return outbox.notice(kind=kind, user=user, key=f"{key}:{user.pk}", subject=subject, text=text, now=now)
 
 
 def _link(name: str, *arguments: object) -> str:

@@ -42,7 +42,7 @@ def send_or_keep(*, message: EmailMessage, now: datetime) -> None:
     )
 
 
-def tell(*, kind: MailKind, user: User, key: str, subject: str, text: str, now: datetime) -> Mail:
+def notice(*, kind: MailKind, user: User, key: str, subject: str, text: str, now: datetime) -> Mail:
     """Make a notice for `queue`, with a subject of one line."""
     return Mail(
         kind=kind,

@@ -132,7 +132,7 @@ FIELDS = tuple(_CLEANERS)
 """The fields that a team edits, in the order in which forms ask for them."""
 
 
-def name_meant(*, user: User, text: str) -> str:
+def method_name_of(*, user: User, text: str) -> str:
     """Return the name for a name or id of the person's own method. Raises `Refused` for another's id."""
     text = text.strip()
     try:

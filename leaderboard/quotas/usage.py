@@ -89,7 +89,7 @@ def state(*, team: Team | None, user: User, split: Split, now: datetime) -> Quot
     """Return the team's quota on the split; that of the user without a team."""
     rules = rules_of(team=team, split=split)
     spent, rejected = _spent(team=team, user=user, split=split, rules=rules, now=now)
-    return weigh(split=split, rules=rules, spent=spent, rejected=rejected, now=now)
+    return quota_at(split=split, rules=rules, spent=spent, rejected=rejected, now=now)
 
 
 def lock(*, team: Team) -> bool:
@@ -100,7 +100,7 @@ def lock(*, team: Team) -> bool:
     return team.pk in {row.pk for row in rows.order_by("pk")}
 
 
-def hold_accounts(*, user: User) -> None:
+def lock_accounts(*, user: User) -> None:
     """Lock the accounts of this mailbox: two of them cannot take one slot. Raises `Refused` if closed."""
     same = Q(pk=user.pk) | Q(mailbox__in=User.objects.filter(pk=user.pk).values("mailbox"))
     rows = User.objects.select_for_update(no_key=True).filter(same).order_by("pk")
@@ -199,7 +199,7 @@ def _with_bytes(quota: Quota, *, team: Team | None, user: User, size_bytes: int,
     )
 
 
-def weigh(
+def quota_at(
     *, split: Split, rules: QuotaRules, spent: Sequence[datetime], rejected: Sequence[datetime], now: datetime
 ) -> Quota:
     """Compute the quota from times, oldest first: of submissions that cost a slot, and of rejected ones."""

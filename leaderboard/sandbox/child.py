@@ -74,7 +74,7 @@ def read_predictions(
     max_bytes = MAX_WORDS_BYTES + 8 * manifest.n_sequences
     try:
         reply = read(source, request, max_bytes=max_bytes, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
-    except fork_server.TooMuch:
+    except fork_server.AnswerTooLarge:
         raise ChildDied(f"reading the file gave an answer of more than {max_bytes:,} bytes") from None
     if not reply.output.startswith(READY):
         raise ChildNotReady(f"the reading process did not start: {_cause(reply.returncode, reply.complaint)}")
@@ -150,13 +150,13 @@ def _spawned(
 
 
 def _at_most(pipe: IO[bytes] | None, max_bytes: int) -> bytes:
-    """Read the pipe to its end. Closes it and raises `TooMuch` above `max_bytes`."""
+    """Read the pipe to its end. Closes it and raises `AnswerTooLarge` above `max_bytes`."""
     if pipe is None:
         raise RuntimeError("the reading process was started without pipes")
     with pipe:
         data = pipe.read(max_bytes + 1)
     if len(data) > max_bytes:
-        raise fork_server.TooMuch
+        raise fork_server.AnswerTooLarge
     return data
 
 

@@ -41,7 +41,7 @@ class Interrupted(Exception):
     """The heartbeat returned False; the reader has been ended."""
 
 
-class TooMuch(Exception):
+class AnswerTooLarge(Exception):
     """The reader wrote more than any answer has; it has been ended."""
 
 
@@ -102,7 +102,7 @@ class ForkServer:
     ) -> Answer:
         """Read one file in a process of its own, with a heartbeat every `heartbeat_s` seconds.
 
-        Raises `NotStarted`; `ServerEnded`, `Interrupted` or `TooMuch`, which close this server.
+        Raises `NotStarted`; `ServerEnded`, `Interrupted` or `AnswerTooLarge`, which close this server.
         """
         reading = _Reading(max_bytes=max_bytes)
         try:
@@ -188,7 +188,7 @@ class _Reading:
         return Answer(self._returncode, bytes(self.output), bytes(self.complaint))
 
     def receive(self, *, timeout_s: float) -> None:
-        """Receive what comes within that time. Raises `NotStarted`, `ServerEnded` or `TooMuch`."""
+        """Receive what comes within that time. Raises `NotStarted`, `ServerEnded` or `AnswerTooLarge`."""
         for key, _ in self._selector.select(timeout_s):
             if isinstance(key.data, bytearray):
                 self._read(key.fd, key.data)
@@ -199,7 +199,7 @@ class _Reading:
         chunk = os.read(pipe, _CHUNK_BYTES)
         into += chunk
         if len(into) > self._max_bytes:
-            raise TooMuch
+            raise AnswerTooLarge
         if not chunk:
             self._selector.unregister(pipe)
             os.close(pipe)

@@ -126,7 +126,7 @@ def compare(
 
     Queues pairs that are not computed; they have `differences` None. Pairs that `disclosure.why_withheld`
     names have only the difference of the published values. Raises `BadComparison`, `UnknownMethod`,
-    `NotOnTheBoard`, and `questions.AskedTooOften` by account or `address`.
+    `NotOnTheBoard`, and `questions.TooManyComparisons` by account or `address`.
     """
     board = snapshots.board(split=split, edition=edition, viewer=viewer)
     if board.edition is None:

@@ -16,7 +16,7 @@ from leaderboard.ops import broker, rate_limits
 Key = tuple[UUID, UUID]
 
 
-class AskedTooOften(Exception):
+class TooManyComparisons(Exception):
     """The account or address has had too many pairs computed within a minute."""
 
     code = "throttled"
@@ -42,11 +42,11 @@ class NewComparisons(rate_limits.Throttle):
 def ask(
     *, edition: Edition, pairs: Sequence[Key], user: User | AnonymousUser, address: str, now: datetime
 ) -> None:
-    """Queue comparisons of new pairs of evaluations. Raises `AskedTooOften`; nothing is written then."""
+    """Queue comparisons of new pairs of evaluations. Raises `TooManyComparisons`; nothing is written then."""
     throttle = NewComparisons()
     who = f"account:{user.pk}" if user.is_authenticated else address
     if pairs and not throttle.allow_request(who):
-        raise AskedTooOften(wait_s=throttle.wait_s)
+        raise TooManyComparisons(wait_s=throttle.wait_s)
     _write(edition=edition, pairs=pairs, asked_at=now)
 
 

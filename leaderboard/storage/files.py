@@ -29,7 +29,7 @@ FRESH = timedelta(hours=12)
 """Younger files are nobody's to clean up; see `storage.orphans`, which waits for twice as long."""
 
 
-class StoreAway(OSError):
+class StoreUnavailable(OSError):
     """The store does not answer, or refuses us. Another try later may help."""
 
 

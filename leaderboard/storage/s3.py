@@ -20,7 +20,7 @@ from django.core.files.base import File
 from storages.backends.s3 import S3Storage
 from storages.utils import clean_name
 
-from leaderboard.storage.files import StoreAway
+from leaderboard.storage.files import StoreUnavailable
 
 CONNECT_TIMEOUT_S = 3
 READ_TIMEOUT_S = 15
@@ -61,9 +61,11 @@ def _as_os_errors() -> Iterator[None]:
             raise FileNotFoundError(errno.ENOENT, "the file store does not have the file") from fault
         if code in _FULL:
             raise OSError(errno.ENOSPC, "the file store is full") from fault
-        raise StoreAway(errno.EIO, f"the file store refused ({code})") from fault
+        raise StoreUnavailable(errno.EIO, f"the file store refused ({code})") from fault
     except BotoCoreError as fault:
-        raise StoreAway(errno.EIO, f"the file store does not answer ({type(fault).__name__})") from fault
+        raise StoreUnavailable(
+            errno.EIO, f"the file store does not answer ({type(fault).__name__})"
+        ) from fault
 
 
 class S3FileStore(S3Storage):

@@ -162,7 +162,7 @@ def _record(request: SubmissionRequest, file: files.StoredFile, *, split: Split)
 
 
 def _locked_team(user: User) -> Team:
-    usage.hold_accounts(user=user)
+    usage.lock_accounts(user=user)
     team = teams.team_of(user=user)
     usage.lock(team=team)
     teams.require_member(team, user)

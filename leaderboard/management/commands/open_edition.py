@@ -75,7 +75,7 @@ class Command(RefusingCommand):
     def _look(self, options: dict[str, Any]) -> None:
         if not options["dry_run"]:
             raise CommandError("--diff needs --dry-run.")
-        changes = label_changes.look(split_name=options["split"], path=options["truth"])
+        changes = label_changes.load(split_name=options["split"], path=options["truth"])
         counts, rows = changes.counts, changes.recordings
         self.stdout.write(
             f"Against {changes.edition}: {counted(counts.n_added, 'sequence')} added, "

@@ -25,7 +25,7 @@ class Command(AccountCommand):
         event = second_factor.reset(user=user, reason=options["reason"])
         name = settings.BENCHMARK.site_name
         text = _MAIL.format(contact=settings.CONTACT_EMAIL, site=settings.SITE_URL, name=name)
-        mail = outbox.tell(
+        mail = outbox.notice(
             kind=MailKind.ACCOUNT,
             user=user,
             key=f"second-factor-reset:{event.pk}",

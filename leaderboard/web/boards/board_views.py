@@ -24,10 +24,10 @@ def board(request: HttpRequest, split: str) -> HttpResponse:
     split_row = split_or_404(request, split)
     # Asked for only by a page that tells it: a board of the past does not.
     news = SimpleLazyObject(lambda: edition_tables.news(split_row))
-    return draw_board(request, "boards/board.html", split=split_row, news=news)
+    return render_board(request, "boards/board.html", split=split_row, news=news)
 
 
-def draw_board(
+def render_board(
     request: HttpRequest, template: str, *, split: Split, edition: Edition | None = None, **more: Any
 ) -> HttpResponse:
     """Draw a board as its address says; an edition's has no other time.
@@ -92,7 +92,7 @@ def editions(request: HttpRequest, split: str) -> HttpResponse:
 def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
     row = get_object_or_404(snapshots.editions(), split=split, number=number)
     past = history.record_of(row)
-    return draw_board(
+    return render_board(
         request,
         "boards/editions/edition.html",
         split=row.split,

@@ -45,7 +45,7 @@ def compare(request: HttpRequest) -> HttpResponse:
             now=timezone.now(),
             address=rate_limits.address_of(request),
         )
-    except (comparisons.BadComparison, questions.AskedTooOften) as refusal:
+    except (comparisons.BadComparison, questions.TooManyComparisons) as refusal:
         return _refused(request, split, refusal)
     draw = cacheable(_drawn) if compared.is_complete else _drawn  # what is being computed changes by itself
     return draw(request, compared)
@@ -87,12 +87,14 @@ def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None
 
 
 def _refused(
-    request: HttpRequest, split: Split | None, refusal: comparisons.BadComparison | questions.AskedTooOften
+    request: HttpRequest,
+    split: Split | None,
+    refusal: comparisons.BadComparison | questions.TooManyComparisons,
 ) -> HttpResponse:
     status = UNKNOWN if isinstance(refusal, UnknownSplit | comparisons.UnknownMethod) else BAD_REQUEST
     context = _choice(request, split, refusal) if split else {"refusal": refusal}
     response = render(request, "compare/choose.html", context, status=status)
-    if isinstance(refusal, questions.AskedTooOften):
+    if isinstance(refusal, questions.TooManyComparisons):
         response.status_code = TOO_MANY
         response["Retry-After"] = str(refusal.retry_after_s)
     return response

@@ -159,11 +159,11 @@ EXAMPLES: Final[Mapping[str, Example]] = {
         f"tsttc download {SUBMISSION} -o predictions.json",
         f'client.file("{SUBMISSION}")',
     ),
-    "foresee_method": Example(
+    "preview_visibility": Example(
         _own(f"methods/{DRAFT}/visibility", ("as", "ANONYMOUS")),
         _own(f"methods/{DRAFT}/visibility", ("as", "EVERYONE")),
         "",
-        f'client.foreseen("{DRAFT}", "ANONYMOUS")',
+        f'client.visibility_preview("{DRAFT}", "ANONYMOUS")',
     ),
     "edit_method": Example(
         _send("PATCH", f"methods/{DRAFT}", body={"n_frames": 6, "cameras": "ONE"}),

@@ -104,9 +104,9 @@ class PolicyForm(QuotaRulesForm):
     def filled_with(policy: Policy) -> dict[str, Any]:
         gap = policy.quota_min_gap
         return asdict(policy) | {
-            "opens_at": deadlines.written(policy.opens_at),
-            "closes_at": deadlines.written(policy.closes_at),
-            "announcement_ends_at": deadlines.written(policy.announcement_ends_at),
+            "opens_at": deadlines.formatted(policy.opens_at),
+            "closes_at": deadlines.formatted(policy.closes_at),
+            "announcement_ends_at": deadlines.formatted(policy.announcement_ends_at),
             "quota_window": span(policy.quota_window),
             "quota_min_gap": span(gap) if gap else "",
         }

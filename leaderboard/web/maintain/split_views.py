@@ -62,7 +62,7 @@ def change(request: HttpRequest, split: str) -> HttpResponse:
 def announcement(request: HttpRequest) -> HttpResponse:
     current = PageVersion.announcement().first()
     initial = (
-        {"announcement": current.text, "announcement_ends_at": deadlines.written(current.ends_at)}
+        {"announcement": current.text, "announcement_ends_at": deadlines.formatted(current.ends_at)}
         if current
         else {}
     )
@@ -77,7 +77,7 @@ def announcement(request: HttpRequest) -> HttpResponse:
 
 
 class MailForm(SiteForm):
-    """The arguments of `announcements.written`."""
+    """The arguments of `announcements.cleaned`."""
 
     subject = forms.CharField(
         max_length=announcements.MAX_SUBJECT,
@@ -105,7 +105,7 @@ def mail(request: HttpRequest, split: str) -> HttpResponse:
     form = MailForm.asked(request)
     if form.is_valid():
         with form.refusals():
-            announcement = announcements.written(split=split_row, **form.cleaned_data)
+            announcement = announcements.cleaned(split=split_row, **form.cleaned_data)
             return _sent(request, announcement) if step == "send" else _preview(request, announcement)
     return form_page(request, "maintain/mail.html", form, split=split_row)
 
@@ -116,7 +116,7 @@ def _preview(request: HttpRequest, announcement: Announcement) -> HttpResponse:
         "announcement": announcement,
         "subject": subject,
         "text": text,
-        "n_people": len(announcements.left(announcement)),
+        "n_people": len(announcements.recipients(announcement)),
     }
     return render(request, "maintain/mail_preview.html", context)
 

@@ -109,7 +109,7 @@ def change_visibility(request: HttpRequest, method_id: UUID) -> HttpResponse:
         context["preview"] = preview
         context["preview_label"] = Visibility(preview.visibility).label
         context["details"] = details.words(preview.profile.details)
-        context["sights"] = [(sight, edition_groups(sight.entry, sight.edition)) for sight in preview.sights]
+        context["boards"] = [(board, edition_groups(board.entry, board.edition)) for board in preview.boards]
     return render(request, "methods/visibility.html", context, status=422 if form.errors else 200)
 
 

@@ -67,7 +67,7 @@ class PublicAnswersMiddleware:
 
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
         path = request.path_info
-        if not (path == "/" or path.startswith(PREFIXES)) or not is_anybodys(request):
+        if not (path == "/" or path.startswith(PREFIXES)) or not is_cacheable_request(request):
             return self._get_response(request)
         at = request.GET.get("at", "")
         if at and not _DAY.fullmatch(at):
@@ -89,7 +89,7 @@ class PublicAnswersMiddleware:
         return _response(request, PublicAnswer(*kept))
 
 
-def is_anybodys(request: HttpRequest) -> bool:
+def is_cacheable_request(request: HttpRequest) -> bool:
     """Tell whether the request is an anonymous GET or HEAD of a whole page, under one of our host names."""
     return (
         request.method in {"GET", "HEAD"}

@@ -34,7 +34,7 @@ class UploadLimitMiddleware:
         return render(request, "413.html", {"sentence": sentence}, status=413)
 
 
-class SendThrottle(rate_limits.Throttle):
+class FormThrottle(rate_limits.Throttle):
     """Writing requests of one account, else of one address."""
 
     rates, scope, cache = "PAGE_RATES", "send", cache
@@ -43,13 +43,13 @@ class SendThrottle(rate_limits.Throttle):
         return rate_limits.account_or_address(request)
 
 
-class DrawThrottle(rate_limits.Throttle):
+class PageThrottle(rate_limits.Throttle):
     """Pages rendered for one address."""
 
     rates, scope = "PAGE_RATES", "draw"
 
 
-class DrawAsOfThrottle(rate_limits.Throttle):
+class AsOfPageThrottle(rate_limits.Throttle):
     """Pages of boards of the past, for one address."""
 
     rates, scope = "PAGE_RATES", "as_of"
@@ -70,7 +70,7 @@ class RateLimitMiddleware:
     def __call__(self, request: HttpRequest) -> HttpResponse:
         if not request.path.startswith(self.ELSEWHERE):
             is_reading = request.method in {"GET", "HEAD"}
-            for throttle in (DrawAsOfThrottle(), DrawThrottle()) if is_reading else (SendThrottle(),):
+            for throttle in (AsOfPageThrottle(), PageThrottle()) if is_reading else (FormThrottle(),):
                 if not throttle.allow_request(request):
                     return _too_many(request, wait_s=throttle.wait_s)
         return self.get_response(request)

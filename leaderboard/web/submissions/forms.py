@@ -183,7 +183,7 @@ class SearchForm(forms.Form):
         }
 
     @property
-    def is_asking(self) -> bool:
+    def has_query(self) -> bool:
         return any(self.wanted().values()) or bool(self.errors)
 
     @property

@@ -112,10 +112,10 @@ def truth_of_30_recordings(tmp_path: Path) -> Path:
 
 MINE = {"id": METHOD_ID, "name": "Foo++", "visibility": "PRIVATE"}
 SHOW = f"POST /api/v1/methods/{METHOD_ID}/visibility"
-FORESEE = f"GET /api/v1/methods/{METHOD_ID}/visibility"
+PREVIEW_ADDRESS = f"GET /api/v1/methods/{METHOD_ID}/visibility"
 SCORES = dict.fromkeys(SCORE_NAMES, 14.0)
 MOVED = [{"method": f"M{n}", "method_id": None, "rank_before": n, "rank_after": n + 1} for n in range(3, 10)]
-FORESEEN: dict[str, Any] = {
+PREVIEW: dict[str, Any] = {
     "visibility": "PUBLIC",
     "name": "Foo++",
     "team": "TJU-V\x1b[2J",
@@ -134,7 +134,7 @@ def test_publish_shows_one_s_own_method_once_it_is_confirmed(
     tsttc: Tsttc, site: RecordedSite, name: str
 ) -> None:
     site.put("GET /api/v1/methods", Reply([MINE]))
-    site.put(FORESEE, Reply(FORESEEN))
+    site.put(PREVIEW_ADDRESS, Reply(PREVIEW))
     site.put(SHOW, Reply(MINE | {"visibility": "PUBLIC", "url": "https://e.example/methods/x/"}))
     asked = tsttc("publish", name)
     assert (asked.exit_code, asked.stdout, site.posts) == (2, "", [])
@@ -148,7 +148,7 @@ def test_publish_shows_one_s_own_method_once_it_is_confirmed(
 
 def test_publish_shows_what_everybody_will_see_before_it_asks(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put("GET /api/v1/methods", Reply([MINE]))
-    site.put(FORESEE, Reply(FORESEEN))
+    site.put(PREVIEW_ADDRESS, Reply(PREVIEW))
     lines = tsttc("publish", "Foo++").stderr.splitlines()
     assert lines[0] == r"Everyone will see Foo++, team TJU-V\x1b[2J:"
     assert [line.split() for line in lines[1:4]] == [
@@ -162,7 +162,7 @@ def test_publish_shows_what_everybody_will_see_before_it_asks(tsttc: Tsttc, site
     assert lines[6].startswith("Error: This publishes Foo++, with")
     assert site.requests[-1].path.endswith(f"/{METHOD_ID}/visibility?as=PUBLIC")
     refused = tsttc("publish", "Foo++", "--as", "anonymous", "--json")
-    assert json.loads(refused.stdout)["preview"] == FORESEEN
+    assert json.loads(refused.stdout)["preview"] == PREVIEW
     assert site.requests[-1].path.endswith("?as=ANONYMOUS")
 
 

@@ -84,7 +84,7 @@ def test_our_own_faults(edition: Edition, owner: User, monkeypatch: pytest.Monke
     client.raise_request_exception = False
 
     def away(*args: object, **kwargs: object) -> None:
-        raise files.StoreAway
+        raise files.StoreUnavailable
 
     monkeypatch.setattr(files, "save_predictions", away)
     response = post(client, builders.predictions(edition))

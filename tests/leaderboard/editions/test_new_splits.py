@@ -342,7 +342,7 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
 )
 def test_a_moment_has_a_zone(text: str, moment: str) -> None:
     assert deadlines.parse(text) == datetime.fromisoformat(f"{moment}+00:00")
-    assert deadlines.parse(deadlines.written(deadlines.parse(text))) == deadlines.parse(text)
+    assert deadlines.parse(deadlines.formatted(deadlines.parse(text))) == deadlines.parse(text)
 
 
 @pytest.mark.parametrize(

@@ -208,7 +208,7 @@ def test_a_maintainer_previews_an_announcement_and_sends_it_once(
     assert "Nobody gets this mail" in keeper.post(address, draft | {"step": "preview"}).content.decode()
     with pytest.raises(NotMaintainer):
         announcements.announce(
-            announcements.written(split=edition.split, subject="S", text="T"), now=timezone.now(), actor=owner
+            announcements.cleaned(split=edition.split, subject="S", text="T"), now=timezone.now(), actor=owner
         )
 
 

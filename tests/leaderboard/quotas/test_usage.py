@@ -252,7 +252,9 @@ def test_the_next_slot_opens_exactly_when_the_quota_says(
     split = Split(name="test")
 
     def weighed(at: datetime) -> Quota:
-        return usage.weigh(split=split, rules=rules, spent=sorted(spent), rejected=sorted(rejected), now=at)
+        return usage.quota_at(
+            split=split, rules=rules, spent=sorted(spent), rejected=sorted(rejected), now=at
+        )
 
     quota = weighed(now)
     if quota.is_open:

@@ -13,7 +13,7 @@ from pytest_django import Settings
 from leaderboard.models import Comparison, Edition, Submission, User
 from leaderboard.ops import rate_limits
 from leaderboard.statistics import questions
-from leaderboard.statistics.questions import AskedTooOften
+from leaderboard.statistics.questions import TooManyComparisons
 from leaderboard.storage import truth_values
 from tests import builders
 from tests.leaderboard.web.maintain import queue_rows
@@ -46,7 +46,7 @@ def ask(
     now = timezone.now() - timedelta(seconds=ago_s)
     try:
         questions.ask(edition=edition, pairs=pairs, user=user, address=address, now=now)
-    except AskedTooOften:
+    except TooManyComparisons:
         return False
     return True
 

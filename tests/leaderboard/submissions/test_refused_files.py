@@ -109,7 +109,7 @@ def test_a_store_that_does_not_answer_does_not_hide_the_refusal(
     upload = Meanwhile(DATA, lambda: builders.send(owner, file_of(b"first")))
 
     def fail(self: object, name: str) -> None:
-        raise files.StoreAway("away")
+        raise files.StoreUnavailable("away")
 
     monkeypatch.setattr(files.DurableFileSystemStorage, "delete", fail)
     with pytest.raises(usage.QuotaExceeded):

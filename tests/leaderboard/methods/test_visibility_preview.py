@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 BOARD = "/api/v1/splits/test/board"
 
 
-def foresee(client: Client, method: Method, token: str, query: str) -> tuple[int, dict[str, Any]]:
+def preview_of(client: Client, method: Method, token: str, query: str) -> tuple[int, dict[str, Any]]:
     response = client.get(
         f"/api/v1/methods/{method.pk}/visibility{query}", headers={"Authorization": f"Bearer {token}"}
     )
@@ -23,7 +23,7 @@ def foresee(client: Client, method: Method, token: str, query: str) -> tuple[int
 
 
 @pytest.mark.parametrize("to", ["ANONYMOUS", "PUBLIC"])
-def test_program_foresees_what_everybody_then_sees(
+def test_program_previews_what_everybody_then_sees(
     client: Client, method: Method, owner: User, to: str
 ) -> None:
     edition = Edition.objects.get()
@@ -32,41 +32,41 @@ def test_program_foresees_what_everybody_then_sees(
     builders.score_all()
     token, anybody = builders.token(owner), Client()
     before = {row["method"]: row["rank"] for row in anybody.get(BOARD).json()["entries"]}
-    status, foreseen = foresee(client, method, token, f"?as={to}")
-    assert (status, foreseen["visibility"]) == (200, to)
+    status, preview = preview_of(client, method, token, f"?as={to}")
+    assert (status, preview["visibility"]) == (200, to)
     method.refresh_from_db()
     assert method.visibility == Visibility.PRIVATE
     assert {row["method"]: row["rank"] for row in anybody.get(BOARD).json()["entries"]} == before
 
     change(method, to, owner)
     shown = {row["method"]: row for row in anybody.get(BOARD).json()["entries"]}
-    (sight,) = foreseen["splits"]
-    assert (sight["split"], sight["edition"], sight["n_ranked"], sight["before"]) == ("test", 1, 7, None)
-    assert sight["after"] == shown[foreseen["name"]]
-    assert sight["n_attempts_before"] == 1
-    assert sight["after"]["n_attempts"] == (2 if to == "PUBLIC" else 1)
-    moved = {row["method"]: (row["rank_before"], row["rank_after"]) for row in sight["moved"]}
+    (board,) = preview["splits"]
+    assert (board["split"], board["edition"], board["n_ranked"], board["before"]) == ("test", 1, 7, None)
+    assert board["after"] == shown[preview["name"]]
+    assert board["n_attempts_before"] == 1
+    assert board["after"]["n_attempts"] == (2 if to == "PUBLIC" else 1)
+    moved = {row["method"]: (row["rank_before"], row["rank_after"]) for row in board["moved"]}
     assert moved == {name: (rank, shown[name]["rank"]) for name, rank in before.items()}
     assert len(moved) == 6
     document = anybody.get(f"/api/v1/methods/{method.pk}").json()
     fields = ("name", "team", "description", "paper_url", "code_url", "details")
-    assert {name: foreseen[name] for name in fields} == {name: document[name] for name in fields}
-    hidden = [secret for secret in SECRETS if secret in json.dumps(foreseen)]
+    assert {name: preview[name] for name in fields} == {name: document[name] for name in fields}
+    hidden = [secret for secret in SECRETS if secret in json.dumps(preview)]
     assert (hidden == []) == (to == "ANONYMOUS")
 
 
 def test_revealing_an_anonymous_method_moves_nobody(client: Client, method: Method, owner: User) -> None:
     change(method, "ANONYMOUS", owner)
-    (sight,) = foresee(client, method, builders.token(owner), "?as=PUBLIC")[1]["splits"]
-    assert (sight["before"]["method"], sight["after"]["method"]) == (method.pseudonym, "Secret sauce")
-    assert (sight["before"]["rank"], sight["after"]["rank"], sight["moved"]) == (1, 1, [])
+    (board,) = preview_of(client, method, builders.token(owner), "?as=PUBLIC")[1]["splits"]
+    assert (board["before"]["method"], board["after"]["method"]) == (method.pseudonym, "Secret sauce")
+    assert (board["before"]["rank"], board["after"]["rank"], board["moved"]) == (1, 1, [])
 
 
-def test_what_a_method_cannot_become_is_not_foreseen(client: Client, method: Method, owner: User) -> None:
+def test_what_a_method_cannot_become_has_no_preview(client: Client, method: Method, owner: User) -> None:
     token = builders.token(owner)
     for query in ("", "?as=", "?as=PRIVATE", "?as=public"):
-        status, answer = foresee(client, method, token, query)
+        status, answer = preview_of(client, method, token, query)
         assert (status, answer["code"], answer["problems"][0]["where"]) == (400, "bad-visibility", "as")
     change(method, "PUBLIC", owner)
-    status, answer = foresee(client, method, token, "?as=ANONYMOUS")
+    status, answer = preview_of(client, method, token, "?as=ANONYMOUS")
     assert (status, answer["code"]) == (422, "shown-for-good")
