@@ -144,7 +144,7 @@ def test_nobody_sees_what_is_hidden_at_any_address(db: None, tmp_path: Path) -> 
 
 
 def test_boards_are_asked_whatever_their_pages_ask(db: None, tmp_path: Path) -> None:
-    assert set(FILTERS) == set(filters.FILTERS)
+    assert set(FILTERS) == set(filters.FILTERS), "give each its values in tests/security/addresses.py"
     asked = {name for name in QUERIES if name not in {"format", "team", "intervals", "mine", "as"}}
     assert BoardQuery(given=dict.fromkeys(asked, "x")).href(page="x").count("=") == len(asked)
     paths = thinned(addresses(build(tmp_path / "world", has_secrets=False)), ADDRESSES_IN_THE_SUITE)

@@ -14,14 +14,14 @@ def import_models(config: AppConfig) -> None:
     from leaderboard.methods import details  # noqa: PLC0415 - needs the models
     from leaderboard.models import Method  # noqa: PLC0415
 
-    Method.add_to_class("optimizer", models.CharField(max_length=40, blank=True))
+    Method.add_to_class("mascot", models.CharField(max_length=40, blank=True))
     row = details.Detail(
-        name="optimizer",
+        name="mascot",
         kind=details.free_text(40),
-        label="Optimizer",
-        help="What the weights were trained with.",
-        filter="optimizer",
-        example="AdamW",
+        label="Mascot",
+        help="What the team calls the network.",
+        filter="mascot",
+        example="Owl",
     )
     details.DETAILS += (row,)
 

@@ -3,6 +3,7 @@
 import pytest
 from django.test import Client
 
+from evaluator import PROTOCOLS
 from leaderboard.models import (
     AuditEvent,
     Edition,
@@ -59,7 +60,7 @@ def test_opening_says_that_values_are_never_uploaded(keeper: Client, rescored: E
         ({}, "and is the current board already."),
         ({"digest": "sha256:0"}, "That ground truth is not this split's"),
         ({"digest": ""}, "No ground truth was chosen"),
-        ({"protocol": "mine"}, "There is no such protocol; expected one of tsttc-1, toolkit."),
+        ({"protocol": "mine"}, f"There is no such protocol; expected one of {', '.join(PROTOCOLS)}."),
     ],
 )
 def test_what_cannot_be_opened_is_refused_in_a_sentence(
