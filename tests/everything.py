@@ -20,7 +20,7 @@ ON_SQLITE_TOO = (
     "tests/leaderboard/quotas",
     "tests/leaderboard/queue/test_lifecycle.py",
     "tests/leaderboard/queue/test_lifecycle_states.py",
-    "tests/leaderboard/statistics/test_questions.py",
+    "tests/leaderboard/statistics/test_comparison_queue.py",
     "tests/leaderboard/submissions",
 )
 

@@ -18,7 +18,7 @@ from leaderboard.errors import outages, problem_codes
 from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.ops import rate_limits
 from leaderboard.quotas import usage
-from leaderboard.statistics import comparisons, questions
+from leaderboard.statistics import comparison_queue, comparisons
 
 UNAUTHORIZED = (exceptions.NotAuthenticated, exceptions.AuthenticationFailed, exceptions.PermissionDenied)
 
@@ -100,7 +100,7 @@ def _domain_error(exc: Exception) -> Response | None:
         case Refused():
             status = REFUSED_STATUS.get(exc.code, 422)
             return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
-        case usage.QuotaExceeded() | questions.TooManyComparisons():
+        case usage.QuotaExceeded() | comparison_queue.TooManyComparisons():
             return _not_yet(exc)
         case filters.BadFilter():
             return problem(status=400, code="bad-filter", detail=str(exc), where=exc.field)
@@ -110,7 +110,7 @@ def _domain_error(exc: Exception) -> Response | None:
     return problem(status=status, code=code, detail=str(exc), where=where)
 
 
-def _not_yet(exc: usage.QuotaExceeded | questions.TooManyComparisons) -> Response:
+def _not_yet(exc: usage.QuotaExceeded | comparison_queue.TooManyComparisons) -> Response:
     if isinstance(exc, usage.QuotaExceeded):
         retry_after_s = exc.quota.retry_after_s(now=timezone.now())
     else:

@@ -19,8 +19,8 @@ from evaluator.tables import sentences
 from leaderboard.boards import listing, rows, snapshots
 from leaderboard.boards.rows import Entry
 from leaderboard.models import Comparison, Edition, Method, Split, User
-from leaderboard.statistics import confidence, disclosure, questions, recording_sums
-from leaderboard.statistics.questions import Key
+from leaderboard.statistics import comparison_queue, confidence, disclosure, recording_sums
+from leaderboard.statistics.comparison_queue import Key
 
 MIN_METHODS, MAX_METHODS = 2, 5
 N_FIRST = 20
@@ -126,7 +126,7 @@ def compare(
 
     Queues pairs that are not computed; they have `differences` None. Pairs that `disclosure.why_withheld`
     names have only the difference of the published values. Raises `BadComparison`, `UnknownMethod`,
-    `NotOnTheBoard`, and `questions.TooManyComparisons` by account or `address`.
+    `NotOnTheBoard`, and `comparison_queue.TooManyComparisons` by account or `address`.
     """
     board = snapshots.board(split=split, edition=edition, viewer=viewer)
     if board.edition is None:
@@ -138,7 +138,7 @@ def compare(
     withheld = _withheld(board.edition, asked)
     known = _known(board.edition, chosen)
     new = [key for key in map(_key, asked) if key not in withheld and not _is_asked_for(known.get(key))]
-    questions.ask(edition=board.edition, pairs=new, user=viewer, address=address, now=now)
+    comparison_queue.ask(edition=board.edition, pairs=new, user=viewer, address=address, now=now)
     pairs = _pairs(asked, known, withheld)
     return Compared(
         split=split,
@@ -165,7 +165,7 @@ def of_first(*, board: listing.Board) -> tuple[Pair, ...]:
     pairs = list(itertools.combinations(first, 2))
     withheld, known = _withheld(board.edition, pairs), _known(board.edition, first)
     new = [key for key in map(_key, pairs) if key not in withheld and key not in known]
-    questions.note(edition=board.edition, pairs=new)
+    comparison_queue.add(edition=board.edition, pairs=new)
     return _pairs(pairs, known, withheld)
 
 
@@ -263,7 +263,7 @@ def compute(row: Comparison, *, now: datetime) -> None:
 
     Raises what `recording_sums.sums_of` raises; the row then waits on.
     """
-    questions.begin(row, now=now)
+    comparison_queue.begin(row, now=now)
     sent = (row.first.submission, row.second.submission)
     withheld = disclosure.why_withheld_by_mark(*sent, edition=row.edition)
     one, other = (rows.flat_scores(each) for each in (row.first, row.second))

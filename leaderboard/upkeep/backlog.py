@@ -11,7 +11,7 @@ from evaluator import Rejected
 from leaderboard.editions import ground_truth
 from leaderboard.queue import worker
 from leaderboard.sandbox import child
-from leaderboard.statistics import analyses, comparisons, confidence, questions
+from leaderboard.statistics import analyses, comparison_queue, comparisons, confidence
 from leaderboard.storage import truth_values
 
 log = structlog.get_logger(__name__)
@@ -51,7 +51,7 @@ def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[
     readable_truths = truth_values.readable_digests()
     for old, new in ground_truth.uncompared(readable_truths=readable_truths):
         yield partial(ground_truth.count_changes, old, new)
-    asked = questions.waiting(readable_truths=readable_truths).select_related(
+    asked = comparison_queue.waiting(readable_truths=readable_truths).select_related(
         "edition__ground_truth", "edition__split", "first__submission__method", "second__submission__method"
     )
     begun: list[int] = []

@@ -13,7 +13,7 @@ from leaderboard.boards.snapshots import splits_of
 from leaderboard.http_caching import cacheable
 from leaderboard.models import Split
 from leaderboard.ops import rate_limits
-from leaderboard.statistics import analyses, comparisons, questions
+from leaderboard.statistics import analyses, comparison_queue, comparisons
 from leaderboard.web.compare import compare_tables
 from leaderboard.web.compare.contact_lens import contact_lens
 
@@ -45,7 +45,7 @@ def compare(request: HttpRequest) -> HttpResponse:
             now=timezone.now(),
             address=rate_limits.address_of(request),
         )
-    except (comparisons.BadComparison, questions.TooManyComparisons) as refusal:
+    except (comparisons.BadComparison, comparison_queue.TooManyComparisons) as refusal:
         return _refused(request, split, refusal)
     draw = cacheable(_drawn) if compared.is_complete else _drawn  # what is being computed changes by itself
     return draw(request, compared)
@@ -89,12 +89,12 @@ def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None
 def _refused(
     request: HttpRequest,
     split: Split | None,
-    refusal: comparisons.BadComparison | questions.TooManyComparisons,
+    refusal: comparisons.BadComparison | comparison_queue.TooManyComparisons,
 ) -> HttpResponse:
     status = UNKNOWN if isinstance(refusal, UnknownSplit | comparisons.UnknownMethod) else BAD_REQUEST
     context = _choice(request, split, refusal) if split else {"refusal": refusal}
     response = render(request, "compare/choose.html", context, status=status)
-    if isinstance(refusal, questions.TooManyComparisons):
+    if isinstance(refusal, comparison_queue.TooManyComparisons):
         response.status_code = TOO_MANY
         response["Retry-After"] = str(refusal.retry_after_s)
     return response

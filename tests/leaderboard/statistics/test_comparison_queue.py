@@ -12,8 +12,8 @@ from pytest_django import Settings
 
 from leaderboard.models import Comparison, Edition, Submission, User
 from leaderboard.ops import rate_limits
-from leaderboard.statistics import questions
-from leaderboard.statistics.questions import TooManyComparisons
+from leaderboard.statistics import comparison_queue
+from leaderboard.statistics.comparison_queue import TooManyComparisons
 from leaderboard.storage import truth_values
 from tests import builders
 from tests.leaderboard.web.maintain import queue_rows
@@ -45,7 +45,7 @@ def ask(
     """Say if they are computed."""
     now = timezone.now() - timedelta(seconds=ago_s)
     try:
-        questions.ask(edition=edition, pairs=pairs, user=user, address=address, now=now)
+        comparison_queue.ask(edition=edition, pairs=pairs, user=user, address=address, now=now)
     except TooManyComparisons:
         return False
     return True
@@ -53,8 +53,8 @@ def ask(
 
 def upcoming() -> tuple[Any, Any]:
     """The pair whose turn it is, which has had it with that."""
-    row = questions.waiting(readable_truths=truth_values.readable_digests())[0]
-    questions.begin(row, now=timezone.now())
+    row = comparison_queue.waiting(readable_truths=truth_values.readable_digests())[0]
+    comparison_queue.begin(row, now=timezone.now())
     Comparison.objects.filter(pk=row.pk).update(computed_at=timezone.now(), differences={})
     return row.first_id, row.second_id
 
@@ -66,7 +66,7 @@ def test_the_first_that_was_asked_for_is_computed_first(edition: Edition, pairs:
 
 
 def test_what_nobody_waits_for_comes_last_until_a_reader_does(edition: Edition, pairs: Pairs) -> None:
-    questions.note(edition=edition, pairs=pairs[:3])
+    comparison_queue.add(edition=edition, pairs=pairs[:3])
     ask(edition, pairs[10])
     ask(edition, pairs[2])
     assert [upcoming() for _ in range(4)] == [pairs[10], pairs[2], pairs[0], pairs[1]]
@@ -76,8 +76,8 @@ def test_what_nobody_waits_for_comes_last_until_a_reader_does(edition: Edition, 
 def test_a_pair_that_cannot_be_computed_keeps_nothing_else_waiting(edition: Edition, pairs: Pairs) -> None:
     ask(edition, pairs[0], ago_s=9)
     ask(edition, pairs[1], ago_s=5)
-    row = questions.waiting(readable_truths=truth_values.readable_digests())[0]
-    questions.begin(row, now=timezone.now())
+    row = comparison_queue.waiting(readable_truths=truth_values.readable_digests())[0]
+    comparison_queue.begin(row, now=timezone.now())
     assert upcoming() == pairs[1]
 
 

@@ -50,7 +50,7 @@ def ask(
     _write(edition=edition, pairs=pairs, asked_at=now)
 
 
-def note(*, edition: Edition, pairs: Sequence[Key]) -> None:
+def add(*, edition: Edition, pairs: Sequence[Key]) -> None:
     """Queue comparisons of these pairs behind all that a user asked for."""
     _write(edition=edition, pairs=pairs, asked_at=None)
 
