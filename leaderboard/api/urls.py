@@ -68,6 +68,7 @@ urlpatterns = [
         name="api-changelog",
     ),
     path("splits/<slug:split>/manifest", views.ManifestView.as_view(), name="manifest"),
+    path("splits/<slug:split>/croissant", views.CroissantView.as_view(), name="api-croissant"),
     path(
         "published",
         published_views.PublishedTablesView.as_view(),

@@ -2,7 +2,7 @@
 
 from typing import cast
 
-from django.http import FileResponse, Http404, HttpResponseBase, HttpResponseNotModified
+from django.http import FileResponse, Http404, HttpResponseBase, HttpResponseNotModified, JsonResponse
 from django.shortcuts import get_object_or_404
 from django.utils import timezone
 from drf_spectacular.utils import OpenApiParameter, extend_schema
@@ -12,11 +12,13 @@ from rest_framework.response import Response
 from rest_framework.views import APIView
 
 from leaderboard.api.authentication import split_of
+from leaderboard.api.exceptions import edition_number
 from leaderboard.api.schema import errors
 from leaderboard.api.serializers import SplitSerializer
 from leaderboard.api.submission_serializers import SubmissionSerializer
 from leaderboard.boards import snapshots
 from leaderboard.editions import history
+from leaderboard.exports import croissant
 from leaderboard.http_caching import is_known
 from leaderboard.models import Edition, Split, Submission, User
 from leaderboard.models.submissions import SubmissionQuerySet
@@ -70,18 +72,17 @@ class SplitsView(APIView):
         return Response(SplitSerializer(rows, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
 
 
+OF_EDITION = OpenApiParameter(
+    "edition", int, description="The number of an edition that is or was the board. Default: the board's."
+)
+
+
 class ManifestView(APIView):
     permission_classes = [AllowAny]
 
     @extend_schema(
         operation_id="manifest",
-        parameters=[
-            OpenApiParameter(
-                "edition",
-                int,
-                description="The number of an edition that is or was the board. Default: the board's.",
-            )
-        ],
+        parameters=[OF_EDITION],
         responses={(200, "text/csv"): str, **errors(404)},
     )
     def get(self, request: Request, split: str) -> HttpResponseBase:
@@ -101,3 +102,21 @@ class ManifestView(APIView):
             content_type="text/csv",
             headers=tag,
         )
+
+
+class CroissantView(APIView):
+    permission_classes = [AllowAny]
+
+    @extend_schema(
+        operation_id="croissant",
+        parameters=[OF_EDITION],
+        responses={(200, "application/ld+json"): dict, **errors(404)},
+    )
+    def get(self, request: Request, split: str) -> JsonResponse:
+        """The manifest as a dataset that programs find and load by: Croissant 1.1 (JSON-LD)."""
+        text = request.query_params.get("edition")
+        current = current_split(request, split).current_edition
+        edition = published_edition(split, edition_number(text)) if text is not None else current
+        if edition is None:
+            raise Http404
+        return JsonResponse(croissant.document(edition), content_type=croissant.MEDIA_TYPE)

@@ -39,8 +39,8 @@ bibtex = "@article{lovelace2030, title = {Events}}"
 """
 # Names of variables and of addresses are those of the software.
 OURS = re.compile(r"TSTTC(?!_)|shi2023|2309\.01539|tusen-ai|Large-Scale Dataset|How long until contact")
-# Guides are documents of the software, and so are the recorded answers with the tables of our paper.
-DOCUMENTS = re.compile(r"/docs/(?!api/).|/docs/api/(list_published_tables|published_table)/")
+# Guides are documents of the software, and so are the recorded answers that quote our paper.
+DOCUMENTS = re.compile(r"/docs/(?!api/).|/docs/api/(list_published_tables|published_table|croissant)/")
 API = ("splits", "splits/test/board", "splits/test/editions", "splits/test/changelog", "published")
 
 

@@ -194,6 +194,7 @@ LINES: dict[str, Line] = {
     "api-edition-board": line(GET=API_OPEN),
     "api-changelog": line(GET=API_OPEN),
     "manifest": line(GET=API_OPEN),
+    "api-croissant": line(GET=API_OPEN),
     "api-published-tables": line(GET=API_OPEN),
     "api-published-table": line(GET=API_OPEN, at={"name": "main-results"}),
     "api-edition-progress": line(GET=API_KEEPERS),

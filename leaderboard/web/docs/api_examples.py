@@ -121,6 +121,7 @@ EXAMPLES: Final[Mapping[str, Example]] = {
         "tsttc manifest --split val",
         'client.manifest("val")',
     ),
+    "croissant": Example(_get("splits/val/croissant"), _get("splits/nowhere/croissant")),
     "compare": Example(
         _get("compare", ("split", "val"), ("m", METHOD), ("m", OTHER)),
         _get("compare", ("split", "val"), ("m", METHOD)),
