@@ -34,12 +34,17 @@ class Landing(_Table, frozen=True):
 
 
 class Dataset(_Table, frozen=True):
-    """The dataset; `code_url` is empty where there is no code."""
+    """The dataset; `code_url` is empty where there is no code.
+
+    `hugging_face_id` is its `owner/name` on the Hugging Face Hub; `{split}` in the task is a split's name.
+    """
 
     name: Text
     description: Text
     url: Address
     code_url: Address | None = None
+    hugging_face_id: Annotated[str, msgspec.Meta(pattern=r"^[\w.-]+/[\w.-]+$")] | None = None
+    hugging_face_task: Text = "{split}"
 
 
 class Paper(_Table, frozen=True):

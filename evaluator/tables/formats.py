@@ -67,6 +67,15 @@ FORMATS: Final = (
         has_values=False,
         is_pasted=True,
     ),
+    Format(
+        name="hf-eval",
+        title="Hugging Face",
+        suffix="yaml",
+        media_type="application/yaml",
+        write=lambda export: "\n".join([*export.eval_results, ""]),
+        has_values=False,
+        is_pasted=True,
+    ),
 )
 """In the order in which they are offered."""
 

@@ -65,6 +65,7 @@ class Export:
     records: Iterable[Mapping[str, object]]
     scores: Sequence[str] = ()  # of its tables
     references: Iterable[str] = ()
+    eval_results: Iterable[str] = ()  # lines of a file of the Hugging Face Hub
 
 
 def about(origin: Origin) -> tuple[str, ...]:

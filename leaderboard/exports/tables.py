@@ -11,13 +11,14 @@ from typing import Final
 from django.conf import settings
 
 from evaluator.scoring.results import format_rounded
-from evaluator.tables import layouts
+from evaluator.tables import formats, layouts
+from evaluator.tables.formats import Format
 from evaluator.tables.layouts import Export
 from evaluator.units import RECORDING
 from leaderboard.boards.filters import BadFilter
 from leaderboard.boards.listing import Board
 from leaderboard.boards.rows import ConfidenceInterval, Entry
-from leaderboard.exports import bibtex
+from leaderboard.exports import bibtex, eval_results
 from leaderboard.methods.details import DETAILS
 
 WITH_INTERVALS: Final = {"1": True, "yes": True, "0": False, "no": False}
@@ -38,6 +39,11 @@ def team_of(entry: Entry) -> str:
 def mark_of(entry: Entry) -> str:
     """Return the note on a row that others see differently; else empty."""
     return layouts.mark_of(visibility=entry.visibility, pseudonym=entry.pseudonym)
+
+
+def offered() -> list[Format]:
+    """Return what pages offer: the format of the Hugging Face Hub only if the site names a dataset there."""
+    return [each for each in formats.FORMATS if each.name != "hf-eval" or eval_results.is_configured()]
 
 
 # --- a board ---------------------------------------------------------------------------------------------
@@ -72,6 +78,7 @@ def export(board: Board, *, address: str, metric: str = "", has_intervals: bool 
             if board.edition
             else "",
         ),
+        eval_results=eval_results.lines(board.entries, edition=board.edition),
     )
 
 

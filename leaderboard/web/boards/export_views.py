@@ -21,7 +21,7 @@ from evaluator.tables.formats import Format
 from leaderboard.boards import snapshots
 from leaderboard.boards.listing import Board
 from leaderboard.boards.results import Result
-from leaderboard.exports import bibtex, tables
+from leaderboard.exports import bibtex, eval_results, tables
 from leaderboard.models import Edition, Split
 from leaderboard.web.boards import board_query
 from leaderboard.web.boards.board_query import BoardQuery
@@ -116,12 +116,16 @@ def _asked(query: BoardQuery, **more: str) -> str:
 
 
 def of_method(results: Sequence[Result]) -> dict[str, str]:
-    """Return the citation of a method, and the split of its badge: the first with a rank."""
+    """Return a method's citation, its result for the Hub, and the split of its badge: the first ranked."""
     first = next((result for result in results if result.entry.rank is not None), None)
     if first is None:
         return {}
     page = settings.SITE_URL + reverse("method", args=[first.entry.method_id])
-    return {"bibtex": bibtex.of_entry(first.entry, page=page), "badge_split": first.split.pk}
+    return {
+        "bibtex": bibtex.of_entry(first.entry, page=page),
+        "eval_result": "\n".join(eval_results.of_entry(first.entry, edition=first.edition)),
+        "badge_split": first.split.pk,
+    }
 
 
 def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str, Any]:
@@ -135,7 +139,7 @@ def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str
         variants["with confidence intervals"] = {"intervals": "1"}
 
     def links(label: str, about: str, **more: str) -> Iterator[dict[str, Any]]:
-        for each in formats.FORMATS:
+        for each in tables.offered():
             if each.has_values or not label:
                 # The API's document has the rows of the user who asks, unless it is asked for without.
                 public = {"mine": "0"} if has_own and each.write is None and "mine" not in more else {}
