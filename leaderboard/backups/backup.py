@@ -1,6 +1,5 @@
 """Make a backup: the tables of one moment, then every file that they name and that the folder lacks."""
 
-import os
 import shutil
 from collections.abc import Callable, Mapping
 from datetime import datetime
@@ -12,11 +11,8 @@ from django.db import connection
 from leaderboard import audit
 from leaderboard.backups import contents, database
 from leaderboard.backups.contents import Contents, NoBackup
-from leaderboard.ops import environment
 from leaderboard.storage import files
 from leaderboard.submissions import receipts
-
-_KEY = "TSTTC_RECEIPT_KEY"
 
 
 def make(*, into: str, now: datetime) -> Contents:
@@ -24,8 +20,7 @@ def make(*, into: str, now: datetime) -> Contents:
 
     Lost files are in `missing`. Raises `NoBackup`, and `OSError`; an earlier backup then stays as it was.
     """
-    if environment.PRODUCTION and not os.environ.get(_KEY):
-        raise NoBackup(f"{_KEY} is not set; expected it here too, since its public half is in the backup.")
+    contents.require_receipt_key()
     folder = contents.folder_of(into)
     former = _former(folder)
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)

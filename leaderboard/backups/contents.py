@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from evaluator.tables import formats
 from leaderboard.boards import listing
 from leaderboard.exports import tables
 from leaderboard.models import Edition, GroundTruth, Submission
+from leaderboard.ops import environment
 from leaderboard.storage import files, truth_values
 from leaderboard.storage.files import CHUNK_BYTES
 
@@ -26,6 +28,7 @@ FORMAT: Final = 3
 # Sums and manifests that workers make again; files named tmp… are being written at this moment.
 _REMADE_FOLDER: Final = "bags"
 _SHOWN: Final = 10
+_KEY: Final = "TSTTC_RECEIPT_KEY"
 
 
 class NoBackup(Exception):
@@ -88,6 +91,12 @@ def folder_of(text: str) -> Path:
         if folder.is_relative_to(kept) or kept.is_relative_to(folder):
             raise NoBackup(f"{folder} and the {name}, {kept}, lie in each other; expected a folder apart.")
     return folder
+
+
+def require_receipt_key() -> None:
+    """Refuse a process of the site without the key of receipts. Raises `NoBackup`."""
+    if environment.PRODUCTION and not os.environ.get(_KEY):
+        raise NoBackup(f"{_KEY} is not set; expected it here too, since its public half is written.")
 
 
 def digest_of(file: IO[bytes]) -> str:
