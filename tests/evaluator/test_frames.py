@@ -32,7 +32,7 @@ def test_sequences_may_be_named_in_a_column(truth: GroundTruth) -> None:
 def test_fault_of_a_frame_has_the_words_of_a_file(truth: GroundTruth, code: str) -> None:
     frame = manifest_frame(truth.manifest).assign(ttc_s=5.0)
     if code == "nan":
-        frame.iloc[3, frame.columns.get_loc("ttc_s")] = float("nan")
+        frame.loc[frame.index[3], "ttc_s"] = float("nan")
     frame = frame.iloc[1:] if code == "missing-keys" else frame
     rows = [*range(len(frame)), 0] if code == "duplicate-keys" else [*range(len(frame))]
     with pytest.raises(Rejected) as caught:

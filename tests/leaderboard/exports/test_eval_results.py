@@ -49,8 +49,8 @@ def test_each_public_method_has_an_entry_that_the_library_of_the_hub_reads(
         assert entry.notes == "test, edition 1, protocol tsttc-1: MiD ×10⁻⁴, lower is better"
     for row, entry in zip(rows, entries, strict=True):
         page = client.get(f"/methods/{row['method_id']}/").text
-        code = re.search(r'<code id="eval-result">(.*?)</code>', page, re.DOTALL)
-        assert entries_of(code[1].replace("&quot;", '"')) == [entry]
+        (code,) = re.findall(r'<code id="eval-result">(.*?)</code>', page, re.DOTALL)
+        assert entries_of(code.replace("&quot;", '"')) == [entry]
     assert "eval-result" not in client.get(f"/methods/{methods[1].pk}/").text
 
 
