@@ -11,10 +11,11 @@ import click
 
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
-from evaluator.cli.failures import Failure, echo_json
+from evaluator.cli.failures import Failure, echo_json, rejected
 from evaluator.cli.layout import printable, score_table, units
 from evaluator.cli.options import json_option, output_option, slug, url_option
 from evaluator.cli.reading import bytes_of, write_bytes
+from evaluator.problems import Rejected
 
 if TYPE_CHECKING:
     from evaluator.receipts import Verified
@@ -42,11 +43,11 @@ def receipt(*, submission_id: str, output: Path | None, url: str) -> None:
     click.echo(f"{output}: check it with tsttc verify {output}")
 
 
-@click.command(short_help="Check the receipt of a score.")
+@click.command(short_help="Check the receipt of a score, or an archive of a leaderboard.")
 @click.argument(
     "receipt_path",
-    metavar="RECEIPT",
-    type=click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path),
+    metavar="RECEIPT|FOLDER",
+    type=click.Path(exists=True, allow_dash=True, path_type=Path),
 )
 @click.option(
     "--keys",
@@ -63,11 +64,18 @@ def verify(*, receipt_path: Path, keys_path: Path | None, url: str, as_json: boo
     The keys of the site are at /.well-known/tsttc-receipt-keys.json; with --keys the check works offline.
     Never use keys that came with the receipt.
 
+    FOLDER is an archive that `manage.py archive` wrote: every file is held against its list, and every
+    receipt against --keys, or else the keys in the archive. This needs no server.
+
     \b
     Examples:
       tsttc verify receipt.jwt --server https://leaderboard.example.org
       tsttc verify receipt.jwt --keys tsttc-receipt-keys.json
+      tsttc verify archive/
     """
+    if receipt_path.is_dir():
+        _verify_archive(receipt_path, keys=bytes_of(keys_path) if keys_path else None, as_json=as_json)
+        return
     from evaluator.receipts import NotVerified, read_keys  # noqa: PLC0415 -- needed here alone
     from evaluator.receipts import verify as verified_by  # noqa: PLC0415 -- as above
 
@@ -91,6 +99,30 @@ def verify(*, receipt_path: Path, keys_path: Path | None, url: str, as_json: boo
         click.echo(
             f"Note: the receipt names {printable(receipt.site)}; the keys are those of {url}.", err=True
         )
+
+
+def _verify_archive(folder: Path, *, keys: bytes | None, as_json: bool) -> None:
+    from evaluator import archives  # noqa: PLC0415 -- needed here alone
+
+    try:
+        archive = archives.check(folder, keys=keys)
+    except Rejected as fault:
+        raise rejected(str(folder), fault) from None
+    except OSError as error:
+        raise click.BadParameter(f"{error.filename} cannot be read: {error.strerror}.") from None
+    if archive.problems:
+        raise rejected(str(folder), Rejected(archive.problems))
+    facts = {name: getattr(archive, name) for name in archive.__dataclass_fields__}
+    if as_json:
+        echo_json(facts)
+        return
+    click.echo("The archive is whole.\n")
+    for name, fact in facts.items():
+        if name != "problems":
+            text = ", ".join(fact) if isinstance(fact, tuple) else fact
+            click.echo(printable(f"{name.replace('_', ' '):<12} {text}"))
+    if keys is None:
+        click.echo("\nThe keys are those in the archive: compare them with the keys that the site published.")
 
 
 def _in_words(receipt: Verified) -> Iterator[str]:

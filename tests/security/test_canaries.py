@@ -8,6 +8,7 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
+from django.core.management import call_command
 from django.db import connection
 from django.test import Client
 from django.utils import timezone
@@ -98,6 +99,7 @@ def test_no_value_leaves_the_private_directory(
     builders.infer_all()
     pollers.sweep(rng=RNG)
     seen |= {f"after {where}": body for where, body in _look(people).items()}
+    call_command("archive", str(tmp_path / "archive"))
     haystacks = {
         **seen,
         "log": log.getvalue().encode(),
@@ -107,6 +109,7 @@ def test_no_value_leaves_the_private_directory(
     messages = [name for name in haystacks if name.startswith("broker/")]
     assert set(Evaluation.objects.values_list("status", flat=True)) >= {"SCORED", "REJECTED", "SYSTEM_ERROR"}
     assert len(messages) > 5
+    assert "archive/boards/test/edition-2.csv" in haystacks
     assert len(seen) > 150
     assert len(haystacks["log"]) > 10_000
     assert Search(values).in_all(haystacks) == []
