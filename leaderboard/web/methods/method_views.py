@@ -35,7 +35,6 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
         "visibility": row.visibility,
         "is_named": row.is_named_for(request.user),
         "is_mine": is_mine,
-        "can_be_deleted": is_mine and empty_methods.can_be_deleted(row),
         "method_id": row.pk,
         "results": [method_result(result) for result in achieved],
         "sent_to": sent_to,

@@ -60,6 +60,18 @@ def test_what_has_a_score_waits_or_was_shown_stays(
     assert Method.objects.existing().count() == Method.objects.count() == 2
 
 
+def test_what_cannot_be_deleted_leads_to_withdrawing(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
+    sent = builders.submit(owner, builders.predictions(edition), method="Scored", visibility="PRIVATE")
+    builders.score_all()
+    address = f"/methods/{sent.method_id}/"
+    (link,) = [a for a in pages.get(signed_in, address).one("main").all("a") if a.text == "Delete…"]
+    main = pages.get(signed_in, link.attributes["href"]).one("main")
+    (link,) = [a for a in main.all("a") if a.text == "withdraw its submissions"]
+    assert link.attributes["href"] == f"/submissions/?method={sent.method_id}"
+
+
 def test_a_deleted_method_comes_along_to_another_team_and_takes_no_name(
     edition: Edition, rejected: Submission, owner: User, stranger: User
 ) -> None:
