@@ -18,6 +18,7 @@ from leaderboard.web.maintain import (
     queue_views,
     quota_views,
     split_views,
+    team_list_views,
 )
 from leaderboard.web.methods import method_views
 from leaderboard.web.submissions import submission_views
@@ -135,6 +136,7 @@ urlpatterns = [
         quota_views.end_admission,
         name="maintain_admission_end",
     ),
+    path("maintain/teams/", team_list_views.team_list, name="maintain_teams"),
     path("maintain/teams/<uuid:team_id>/", moderation_views.team, name="maintain_team"),
     path(
         "maintain/actions/<slug:action_name>/<slug:subject_id>/",

@@ -144,6 +144,7 @@ LINES: dict[str, Line] = {
     "maintain_admit": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_admission_end": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_splits": line(GET=KEEPERS),
+    "maintain_teams": line(GET=KEEPERS),
     "maintain_team": line(GET=KEEPERS),
     "maintain_action": line(GET=KEEPERS, POST="in 404 404 404 422 in in", at={"action_name": "rename-team"}),
     "maintain_published": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),

@@ -232,7 +232,7 @@ def action(request: HttpRequest, action_name: str, subject_id: str) -> HttpRespo
             arguments = {**form.cleaned_data, "actor": maintainer_of(request), "now": timezone.now()}
             chosen.do(subject=subject, **arguments)
             messages.success(request, f"Done: {chosen.heading[:1].lower()}{chosen.heading[1:]}.")
-            return redirect("maintain_team", team.pk) if team else redirect("maintain_quotas")
+            return redirect("maintain_team", team.pk) if team else redirect("maintain_teams")
     about = {"action": chosen, "subject": _name_of(subject), "team": team}
     return form_page(request, "maintain/action.html", form, **about)
 
