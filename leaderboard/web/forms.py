@@ -51,6 +51,10 @@ def confirmation() -> forms.BooleanField:
     )
 
 
+class ConfirmForm(SiteForm):
+    confirm = confirmation()
+
+
 class DescriptionForm(SiteForm):
     description = forms.CharField(
         required=False,

@@ -3,7 +3,7 @@
 from django.urls import include, path, register_converter
 
 from leaderboard.http_caching import cacheable
-from leaderboard.web.account import data_views, team_views, token_views
+from leaderboard.web.account import data_views, overview_views, team_views, token_views
 from leaderboard.web.boards import board_views, export_views, public_assets
 from leaderboard.web.charts import chart_views, paper_charts
 from leaderboard.web.compare import compare_views
@@ -95,6 +95,7 @@ urlpatterns = [
     path("team/leave/", team_views.leave, name="leave_team"),
     path("team/members/<uuid:handle>/hand-over/", team_views.hand_over, name="hand_over_team"),
     path("team/members/<uuid:handle>/remove/", team_views.remove, name="remove_member"),
+    path("account/", overview_views.overview, name="account"),
     path("account/data/", data_views.data, name="account_data"),
     path("account/data.json", data_views.download, name="account_data_download"),
     path("tokens/", token_views.token_page, name="tokens"),

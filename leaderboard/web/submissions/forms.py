@@ -19,7 +19,6 @@ from leaderboard.people import teams
 from leaderboard.quotas import admissions, usage
 from leaderboard.submissions import search
 from leaderboard.submissions.intake import SubmissionRequest
-from leaderboard.web.forms import SiteForm, confirmation
 from leaderboard.web.methods.method_forms import DetailsForm
 
 
@@ -136,10 +135,6 @@ class SubmissionForm(DetailsForm):
             details={field.name: fields[field.name] for field in (*self.described, *self.detailed)},
             note=fields["note"],
         )
-
-
-class WithdrawForm(SiteForm):
-    confirm = confirmation()
 
 
 def parse_uuid(text: str) -> UUID | None:

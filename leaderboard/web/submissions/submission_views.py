@@ -32,10 +32,11 @@ from leaderboard.submissions.progress import Progress, progress_of
 from leaderboard.web.boards import edition_tables
 from leaderboard.web.charts import analysis_charts
 from leaderboard.web.decorators import own_form, own_page
+from leaderboard.web.forms import ConfirmForm
 from leaderboard.web.lookups import split_or_404
 from leaderboard.web.methods import result_tables
 from leaderboard.web.submissions import outcome_tables
-from leaderboard.web.submissions.forms import SearchForm, SubmissionForm, WithdrawForm
+from leaderboard.web.submissions.forms import SearchForm, SubmissionForm
 from leaderboard.web.submissions.status_line import StateLine, state_line
 
 PER_PAGE = 50
@@ -123,7 +124,7 @@ def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     before = progress_of(row)
     if not outcomes.can_be_withdrawn(row):
         return redirect("submission", row.pk)
-    form = WithdrawForm.asked(request)
+    form = ConfirmForm.asked(request)
     if form.is_valid():
         if intake.withdraw(submission=row, actor=user, now=timezone.now()):
             done = "withdrawn" if before.is_final else "cancelled"

@@ -28,7 +28,7 @@ def test_the_method_of_a_broken_upload_is_deleted_its_file_stays_and_its_name_is
     page = pages.page(signed_in.get(address)).one("main")
     assert f"{address}delete/" in [a.attributes["href"] for a in page.all("a")]
     assert signed_in.get(f"{address}delete/").status_code == 200
-    done = pages.page(signed_in.post(f"{address}delete/", follow=True)).one("main")
+    done = pages.page(signed_in.post(f"{address}delete/", {"confirm": "on"}, follow=True)).one("main")
     assert "Broken Net is deleted." in done.text
     assert "deleted" in done.one("tbody").one("tr").text
     assert signed_in.get(address).status_code == 404
