@@ -39,7 +39,9 @@ def test_sign_up_tells_of_all_that_is_wrong_at_once_and_of_each_rule_once(client
 def test_account_begins_with_what_it_has_and_leads_to_each_part(signed_in: Client, owner: User) -> None:
     builders.token(owner)
     root = pages.get(signed_in, "/account/")
-    tiles = {li.one("a").text: (li.one("strong").text, li.one("a").attributes["href"]) for li in root.all("li")}
+    tiles = {
+        li.one("a").text: (li.one("strong").text, li.one("a").attributes["href"]) for li in root.all("li")
+    }
     assert tiles["Email addresses"][0] == owner.email
     assert tiles["API tokens"] == ("1", "/tokens/")
     assert tiles["Two-factor authentication"][0] == "off"

@@ -179,7 +179,11 @@ def test_codes_can_be_renewed_and_the_app_removed_after_the_password(
     client.post("/accounts/2fa/totp/deactivate/")
     subjects = [message.subject.partition("] ")[2] for message in mail.outbox]
     assert subjects == [
-        *("Two-factor authentication is on", "You have new recovery codes", "Two-factor authentication is off")
+        *(
+            "Two-factor authentication is on",
+            "You have new recovery codes",
+            "Two-factor authentication is off",
+        )
     ]
     assert not Authenticator.objects.exists()
     assert sign_in(Client(), owner) == "/submissions/"
