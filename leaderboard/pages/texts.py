@@ -14,7 +14,6 @@ from django.template.loader import render_to_string
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
 from leaderboard.models import PageVersion, User
-from leaderboard.people import tokens
 
 MAX_TEXT: Final = 20_000
 IMPRINT: Final = "imprint"
@@ -62,7 +61,6 @@ def default_text(name: str) -> str:
         "site_url": settings.SITE_URL,
         "contact": settings.CONTACT_EMAIL,
         "session_days": settings.SESSION_COOKIE_AGE // 86_400,
-        "token_days": tokens.MAX_DAYS,
     }
     return render_to_string(f"pages/{PAGES[name].name}.md", facts).strip() + "\n"
 
