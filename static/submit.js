@@ -81,7 +81,7 @@ function verdictOnValue(value) {
   const split = form.querySelector("input[name=split]:checked");
   const expected = Number(split?.dataset.nSequences ?? 0);
   if (expected && values.length !== expected) {
-    return bad(`The file has ${n}; ${split.value} expects ${grouped(expected)}, one for each sequence.`);
+    return bad(`The file has ${n}; ${split.dataset.title} expects ${grouped(expected)}, one for each sequence.`);
   }
   return ["good", `${n}${expected ? ", one for each sequence" : ""}. The server checks them once the file is sent.`];
 }

@@ -73,7 +73,7 @@ def audit_rows(events: Iterable[AuditEvent]) -> list[AuditRow]:
             event,
             verb_words(event.verb),
             noun_words(event.noun),
-            subjects.get((event.noun, event.noun_id), Subject("")),
+            subjects.get((event.noun, event.noun_id), Subject(_words(event.noun_id))),
             _details(event, names, subjects),
         )
         for event in events
@@ -106,8 +106,10 @@ def _words(value: Any) -> str:
     if isinstance(value, list):
         n_more = len(value) - MAX_LISTED
         more = f" and {n_more:,} more" if n_more > 0 else ""
-        return ", ".join(map(str, value[:MAX_LISTED])) + more
+        return ", ".join(str(each).replace("_", " ") for each in value[:MAX_LISTED]) + more
     text = "" if value is None else _PYTHON.sub(lambda match: _SAID[match[0]], str(value))
+    if text.isupper():  # a choice, as PRIVATE
+        return text.lower()
     return _MOMENT.sub(r"\1 \2 UTC", _DIGEST.sub(r"\1…", text))
 
 

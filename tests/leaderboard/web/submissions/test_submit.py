@@ -116,7 +116,9 @@ def test_the_only_open_split_is_chosen_and_of_closed_ones_stands_the_reason_with
     [choice] = root.all("input", type="radio")
     assert (choice.attributes["value"], "checked" in choice.attributes) == ("test", True)
     closed = root.one("ul", class_="closed-splits")
-    assert closed.text.startswith("val: Submissions to val are not open yet")
+    assert closed.text.startswith(
+        "Submissions to Validation open once the organisers provide the ground truth."
+    )
     assert [a.attributes["href"] for a in closed.all("a")] == ["/board/val/", "/board/demo/"]
 
 
@@ -178,7 +180,7 @@ def test_an_exhausted_quota_stands_at_the_split_before_and_after_the_file_is_sen
     builders.submit(owner, builders.predictions(edition))
     assert "the next slot opens at" in pages.page(signed_in.get("/submit/")).one("main").text
     response = send(signed_in, builders.predictions(edition, factor=1.2))
-    assert error_at(response, "split").startswith("Your team has used 1 submission to test")
+    assert error_at(response, "split").startswith("Your team has used 1 submission to Test")
     assert Submission.objects.count() == 1
 
 
