@@ -1,4 +1,4 @@
-"""A count and its noun, wherever a sentence gives one."""
+"""A count and its noun, and the size of a file, wherever a sentence gives one."""
 
 
 def counted(n: int, singular: str, plural: str = "") -> str:
@@ -8,3 +8,12 @@ def counted(n: int, singular: str, plural: str = "") -> str:
     ('1 label', '12 labels', '2,000 entries')
     """
     return f"{n:,} {singular if n == 1 else plural or singular + 's'}"
+
+
+def file_size(n_bytes: int) -> str:
+    """Word a size in kB, rounded up, so that a file over a limit never reads like one at it.
+
+    >>> file_size(812), file_size(81_234), file_size(20_000_001)
+    ('812 bytes', '82 kB', '20,001 kB')
+    """
+    return counted(n_bytes, "byte") if n_bytes < 1000 else f"{-(-n_bytes // 1000):,} kB"

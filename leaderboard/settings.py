@@ -289,11 +289,13 @@ AUTH_PASSWORD_VALIDATORS = [
     for name in ("UserAttributeSimilarity", "MinimumLength", "CommonPassword", "NumericPassword")
 ]
 LOGIN_URL = "account_login"
-LOGIN_REDIRECT_URL = "/submit/"
+LOGIN_REDIRECT_URL = "/submissions/"
 LOGOUT_REDIRECT_URL = "/"
 ACCOUNT_EMAIL_SUBJECT_PREFIX = f"[{BENCHMARK.site_name}] "
 vars().update(allauth_settings.SETTINGS)
-EMAIL_CONFIG = environment.mail_server(env.str("TSTTC_EMAIL_URL", default="consolemail://"))
+# Without a mail server, as in the demo, each mail is a file.
+NO_MAIL_SERVER = "consolemail://" if PRODUCTION else f"filemail:///{DATA_DIR / 'mail'}"
+EMAIL_CONFIG = environment.mail_server(env.str("TSTTC_EMAIL_URL", default=NO_MAIL_SERVER))
 vars().update(EMAIL_CONFIG)
 # Somebody waits on a page meanwhile; what is not sent within it is sent later.
 EMAIL_TIMEOUT = env.float("TSTTC_EMAIL_TIMEOUT_S", default=5.0)

@@ -8,6 +8,7 @@ const button = form.querySelector(".actions button");
 const byId = (id) => document.getElementById(id);
 const maxBytes = Number(form.dataset.maxBytes);
 const grouped = (n) => n.toLocaleString("en-GB");
+const fileSize = (n) => (n < 1000 ? counted(n, "byte") : `${grouped(Math.ceil(n / 1000))} kB`);
 const counted = (n, noun) => `${grouped(n)} ${noun}${n === 1 ? "" : "s"}`;
 
 function element(tag, text = "", css = "") {
@@ -20,7 +21,7 @@ function element(tag, text = "", css = "") {
 // --- the check: what can be seen here at once; the server names every problem -----------------------------------
 
 const ENVELOPE = ["unit", "fps", "frame_gap", "meta", "predictions"];
-const LEFT_TO_THE_SERVER = ["", "The server checks this file once it is sent."];
+const leftToTheServer = (kind) => ["", `The server checks ${kind} once it is sent.`];
 let nChecks = 0;
 // What is known of the chosen file: "" nothing, "checking", "good", "bad" or "too large"; `settled` calls whoever
 // waits for it.
@@ -39,31 +40,29 @@ async function check() {
   const number = ++nChecks;
   const file = input.files[0];
   input.setCustomValidity("");
-  byId("chosen").textContent = file ? `${grouped(file.size)} bytes` : "";
+  byId("chosen").textContent = file ? fileSize(file.size) : "";
   if (!file) return conclude("");
   if (file.size > maxBytes) {
-    const most = `${grouped(maxBytes)} (${maxBytes / 1e6} MB)`;
-    const sentence = `The file has ${grouped(file.size)} bytes; expected at most ${most}.`;
+    const sentence = `The file has ${fileSize(file.size)}; expected at most ${fileSize(maxBytes)}.`;
     input.setCustomValidity(sentence);
     return conclude("too large", sentence);
   }
   conclude("checking", "Checking the file…");
-  const found = await verdictOn(file).catch(() => LEFT_TO_THE_SERVER);
+  const found = await verdictOn(file).catch(() => leftToTheServer("this file"));
   if (number === nChecks) conclude(...found);
 }
 
 async function verdictOn(file) {
   const text = await file.text();
-  const isGzip = text.startsWith("\x1f\ufffd");
-  const isTable = /^\s*"?\w+"?\s*,/.test(text);
-  if (isGzip || isTable) return LEFT_TO_THE_SERVER;
+  if (text.startsWith("\x1f\ufffd")) return leftToTheServer("a gzip file");
+  if (/^\s*"?\w+"?\s*,/.test(text)) return leftToTheServer("a CSV file");
   if (!text.trim()) return bad("The file is empty; expected JSON text with a number for every sequence.");
   let value;
   try {
     value = JSON.parse(text);
   } catch (fault) {
     // Python writes these; the server says of each where it stands.
-    if (/\b(NaN|Infinity)\b/.test(text)) return LEFT_TO_THE_SERVER;
+    if (/\b(NaN|Infinity)\b/.test(text)) return leftToTheServer("this file");
     const at = /line (\d+),? column (\d+)/.exec(fault.message);
     return bad(at ? `The text is not JSON: line ${at[1]}, column ${at[2]}.` : "The text is not JSON.");
   }
@@ -77,12 +76,12 @@ function verdictOnValue(value) {
   const values = isObject(predictions) ? Object.values(predictions) : [];
   const n = counted(values.length, "prediction");
   if (values.length && values.every((each) => each === null)) {
-    return bad(`This is the empty template: ${counted(values.length, "value")} to be filled in.`);
+    return bad(`This is the empty template: all ${grouped(values.length)} values are null; expected a number for every sequence.`);
   }
   const split = form.querySelector("input[name=split]:checked");
   const expected = Number(split?.dataset.nSequences ?? 0);
   if (expected && values.length !== expected) {
-    return bad(`The file has ${n}; ${split.value} expects ${grouped(expected)}, one for each sequence.`);
+    return bad(`The file has ${n}; ${split.dataset.title} expects ${grouped(expected)}, one for each sequence.`);
   }
   return ["good", `${n}${expected ? ", one for each sequence" : ""}. The server checks them once the file is sent.`];
 }

@@ -232,7 +232,7 @@ def _quota_in_words(rows: Sequence[Quota]) -> Iterator[str]:
     for row in rows:
         limit = "any number" if row.limit is None else f"{row.limit:,}"
         left = NO_VALUE if row.left is None else f"{row.left:,}"
-        opens = "now" if row.is_open else row.next_slot_at or "never"
+        opens = "now" if row.is_open else row.next_slot_at or "closed"
         table.append([Cell(printable(text)) for text in (row.split, left, limit, opens)])
     yield from aligned(table, align="<>><")
     sentences = [f"{row.split}: {row.sentence}" for row in rows if row.sentence and not row.is_open]

@@ -78,9 +78,9 @@ def timeout_option(command: Command) -> Command:
     )(command)
 
 
-def slug(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
+def slug(_context: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
     """Check a name for use in an address: letters, digits, hyphens and underscores."""
-    if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", value):
+    if value is not None and not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", value):
         raise click.BadParameter(f"found {value!r}, expected letters, digits, hyphens and underscores alone.")
     return value
 

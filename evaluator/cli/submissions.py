@@ -137,7 +137,7 @@ def submit(
 
 
 @click.command(short_help="Show the state, the scores or the problems of a submission.")
-@click.argument("submission_id", metavar="ID", callback=slug)
+@click.argument("submission_id", metavar="[ID]", callback=slug, required=False)
 @click.option("--watch", is_flag=True, help="Wait until the state is final.")
 @timeout_option
 @gates.fail_if_option
@@ -145,7 +145,7 @@ def submit(
 @json_option
 def status(
     *,
-    submission_id: str,
+    submission_id: str | None,
     watch: bool,
     timeout_s: float,
     fail_if: list[gates.Condition],
@@ -154,12 +154,16 @@ def status(
 ) -> None:
     """Show the state of submission ID: its place in the queue, its scores, or what is wrong in the file.
 
+    Without ID, that of your team's latest submission.
+
     \b
     Examples:
+      tsttc status
       tsttc status 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11
       tsttc status 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11 --watch --fail-if "mid > 15.0"
     """
     with connect(url, with_token=True) as client:
+        submission_id = submission_id or _latest(client)
         submission = (
             _followed(client, submission_id, timeout_s=timeout_s)
             if watch
@@ -170,6 +174,15 @@ def status(
         as_json=as_json,
         judge=lambda: gates.judge(fail_if, submission.scores, decimals=submission.decimals),
     )
+
+
+def _latest(client: Client) -> str:
+    submission = next(client.submissions(), None)
+    if submission is None:
+        raise Failure(
+            "Your team has no submission yet; expected the ID of one.", exit_code=Exit.USAGE, code="not-found"
+        )
+    return submission.id
 
 
 def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> frozenset[str]:

@@ -13,7 +13,7 @@ import numpy as np
 from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap, scale_ratio_to_ttc
 from evaluator.predictions.documents import Document, Members, Unit, kind_of, parse, read_document
 from evaluator.predictions.values import RULES, allowed, broken_rule
-from evaluator.problems import Findings, listed, pointer, quoted
+from evaluator.problems import Findings, listed, pointer, quoted, reject
 from evaluator.truth.ground_truth import Manifest
 
 KeyKind = Literal["anno_id", "natural_key"]
@@ -36,6 +36,7 @@ def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
     # A value and a rate for each sequence, meta, and enough more to name what is too much.
     max_members = 2 * manifest.n_sequences + 100_000
     document = read_document(parse(data, max_members=max_members))
+    _require_filled(document.predictions, manifest)
     findings = Findings()
     keys = _check_keys(document.predictions, manifest, findings, document.pointer)
     values = _column(document.predictions, manifest, findings, document.pointer, fault_of(document.unit))
@@ -54,6 +55,16 @@ def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
                 findings.add(rule.code, message, document.pointer(names[row]))
     findings.raise_if_any()
     return Aligned(document, values, keys)
+
+
+def _require_filled(members: Members, manifest: Manifest) -> None:
+    # A template sent as it came is one slip, not a problem for each sequence.
+    if len(members) == manifest.n_sequences and all(value is None for _, value in members):
+        message = (
+            f"This is the empty template: all {len(members):,} values are null; "
+            "expected a number for every sequence."
+        )
+        raise reject("not-a-number", message)
 
 
 def read_rates(document: Document, manifest: Manifest, findings: Findings) -> Floats:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from evaluator.arguments import Source, data_of, require
 from evaluator.arrays import in_row_order
-from evaluator.counting import counted
+from evaluator.counting import counted, file_size
 from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
 from evaluator.predictions.alignment import KeyKind, read_slowly
 from evaluator.predictions.columns import read_column
@@ -102,7 +102,9 @@ def read_predictions(source: Source, *, manifest: Manifest, max_bytes: int | Non
     require(manifest, Manifest, name="manifest")
     data = data_of(source)
     if max_bytes is not None and len(data) > max_bytes:
-        raise reject("too-large", f"The file has {len(data):,} bytes; expected at most {max_bytes:,}.")
+        raise reject(
+            "too-large", f"The file has {file_size(len(data))}; expected at most {file_size(max_bytes)}."
+        )
     return read_sent(as_sent(data), manifest=manifest)
 
 

@@ -24,6 +24,7 @@ from leaderboard.submissions import intake
 
 SPLIT = "demo"
 DEMO_EMAIL = "demo@example.org"
+MAINTAINER_EMAIL = "maintainer@example.org"
 
 TEAMS = {
     "Demo team": DEMO_EMAIL,
@@ -167,7 +168,7 @@ ENTRIES = (
 
 
 def seed(*, now: datetime, password_path: Path) -> str:
-    """Make what is missing of the demo. Returns the password of `DEMO_EMAIL`, kept at `password_path`.
+    """Make what is missing of the demo. Returns the password of its two accounts, kept at `password_path`.
 
     Raises `Refused` where the split `demo` has other ground truth.
     """
@@ -177,6 +178,10 @@ def seed(*, now: datetime, password_path: Path) -> str:
     password = password_path.read_text().strip()
     users = {entry.email: _user(entry) for entry in ENTRIES}
     _create_account(users[DEMO_EMAIL], password=password)
+    maintainer, _ = User.objects.get_or_create(
+        email=MAINTAINER_EMAIL, defaults={"name": "Maintainer", "is_staff": True}
+    )
+    _create_account(maintainer, password=password)
     sent = Submission.objects.filter(split_id=SPLIT).values_list("method__name", "submitted_by__email")
     missing = [entry for entry in ENTRIES if (entry.method, entry.email) not in sent]
     if missing or not Split.objects.get(name=SPLIT).has_ground_truth:

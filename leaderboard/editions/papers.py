@@ -10,6 +10,7 @@ from typing import Any, Final
 from django.core.exceptions import ValidationError
 from django.core.validators import URLValidator
 
+from evaluator.counting import file_size
 from evaluator.metrics.protocol import PROTOCOLS, SCORE_NAMES
 from leaderboard.errors.refusals import Refused
 
@@ -36,7 +37,7 @@ class BadDocument(Refused):
 def parse(data: bytes) -> dict[str, Any]:
     """Parse a document of JSON. Raises `BadDocument`."""
     if len(data) > MAX_BYTES:
-        raise BadDocument([f"The file has {len(data):,} bytes; expected at most {MAX_BYTES:,}."])
+        raise BadDocument([f"The file has {file_size(len(data))}; expected at most {file_size(MAX_BYTES)}."])
     try:
         document = json.loads(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:

@@ -14,7 +14,7 @@ class MailKind(models.TextChoices):
     SCORED = "scored", "A file that I sent on the site is scored or rejected"
     EDITION = "edition", "A new edition of a board that has an entry of my team"
     TOKEN = "token", "An API token of mine ends within a week"
-    DEADLINE = "deadline", "A split that my team has sent files to closes within three days"
+    DEADLINE = "deadline", "A split that my team has submitted to closes within three days"
     ANNOUNCEMENT = "announcement", "Announcements to the teams of a split"
 
 

@@ -10,7 +10,6 @@ from django.conf import settings
 from django.core.checks import CheckMessage, Info
 from django.db import IntegrityError, transaction
 from django.template.loader import render_to_string
-from knox.settings import knox_settings
 
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
@@ -62,7 +61,6 @@ def default_text(name: str) -> str:
         "site_url": settings.SITE_URL,
         "contact": settings.CONTACT_EMAIL,
         "session_days": settings.SESSION_COOKIE_AGE // 86_400,
-        "token_days": knox_settings.TOKEN_TTL.days,
     }
     return render_to_string(f"pages/{PAGES[name].name}.md", facts).strip() + "\n"
 

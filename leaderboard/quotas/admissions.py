@@ -20,7 +20,7 @@ def refusal_of(*, team: Team | None, split: Split) -> Refused | None:
     ask = split.how_to_be_admitted.rstrip(". ") or "ask the maintainers of this site for access"
     return Refused(
         "not-admitted",
-        f"Only admitted teams can submit to {split.pk}, and your team is not one of them; {ask}.",
+        f"Only admitted teams can submit to {split.title}, and your team is not one of them; {ask}.",
         field="split",
     )
 
@@ -70,13 +70,13 @@ def refusal_for_all(split: Split, *, now: datetime) -> Refused | None:
     elif not split.has_ground_truth:
         code, sentence = (
             "split-not-open",
-            "are not open yet: this site does not have the ground truth of the split.",
+            "open once the organisers provide the ground truth.",
         )
     elif opens_at and now < opens_at:
         code, sentence = "split-not-open", f"open at {opens_at:%Y-%m-%d %H:%M} UTC."
     elif closes_at and now >= closes_at:
         code, sentence = "split-closed", f"closed at {closes_at:%Y-%m-%d %H:%M} UTC."
-    return Refused(code, f"Submissions to {split.pk} {sentence}", field="split") if code else None
+    return Refused(code, f"Submissions to {split.title} {sentence}", field="split") if code else None
 
 
 def is_open(split: Split, *, now: datetime) -> bool:
@@ -92,7 +92,7 @@ def sentence_of(split: Split, *, now: datetime) -> str:
 def closing_of(split: Split) -> str:
     """Say until when an open split takes submissions; may be empty."""
     at = split.closes_at
-    return f"Submissions to {split.pk} close at {at:%Y-%m-%d %H:%M} UTC." if at else ""
+    return f"Submissions to {split.title} close at {at:%Y-%m-%d %H:%M} UTC." if at else ""
 
 
 def left(*, team: Team | None, user: User, split: Split, now: datetime) -> usage.Quota:

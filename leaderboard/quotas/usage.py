@@ -211,16 +211,16 @@ def quota_at(
     opens_at = max((at for at in (full_until, gap_until, rejected_until) if at and at > now), default=None)
     is_never = 0 in {rules.quota_limit, rules.quota_rejected_limit}
     if is_never:
-        sentence = f"Your team may not submit to {split.pk}."
+        sentence = f"Your team may not submit to {split.title}."
     elif opens_at is None:
         sentence = _left(rules, n_used=len(in_window))
     else:
         why = {
-            full_until: f"Your team has used {counted(rules.quota_limit or 0, 'submission')} to {split.pk}, "
-            f"its quota for {span(rules.quota_window)}",
-            gap_until: f"Submissions of a team to {split.pk} must be at least "
+            full_until: f"Your team has used {counted(rules.quota_limit or 0, 'submission')} to "
+            f"{split.title}, its quota for {span(rules.quota_window)}",
+            gap_until: f"Submissions of a team to {split.title} must be at least "
             f"{span(rules.quota_min_gap)} apart",
-            rejected_until: f"Your team has reached its limit for {split.pk}: within 24 hours, "
+            rejected_until: f"Your team has reached its limit for {split.title}: within 24 hours, "
             f"{counted(len(rejected), 'file')} that were rejected, were cancelled, or stopped the process "
             "that read them",
         }

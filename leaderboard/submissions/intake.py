@@ -11,6 +11,7 @@ from django.core.files.base import File
 from django.db import transaction
 from django.db.models import Q
 
+from evaluator.counting import file_size
 from evaluator.predictions.documents import EMPTY_MESSAGE
 from leaderboard import audit, board_versions
 from leaderboard.errors.refusals import Refused, clean_text, shown_split
@@ -217,10 +218,8 @@ def _checked(upload: "File[bytes] | None") -> "File[bytes]":
 
 
 def too_large(*, n_bytes: int) -> str:
-    return (
-        f"The file has {n_bytes:,} bytes; expected at most {settings.MAX_PREDICTIONS_BYTES:,} "
-        f"({settings.MAX_PREDICTIONS_BYTES / 1e6:g} MB)."
-    )
+    most = settings.MAX_PREDICTIONS_BYTES
+    return f"The file has {file_size(n_bytes)}; expected at most {file_size(most)}."
 
 
 def _clean_filename(name: str) -> str:

@@ -2,13 +2,14 @@
 
 from django import template
 
+from evaluator.counting import file_size
 from leaderboard.web import formatting
 
 register = template.Library()
 
 register.filter("grouped", formatting.grouped)
 register.filter("counted", formatting.with_noun)
-register.filter("size", formatting.size)
+register.filter("size", file_size)
 register.filter("duration", formatting.duration)
 register.filter("ticked", formatting.ticked)
 register.filter("breakable", formatting.breakable)

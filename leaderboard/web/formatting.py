@@ -1,4 +1,4 @@
-"""Times, counts and sizes on every page."""
+"""Times and counts on every page."""
 
 from datetime import UTC, datetime
 
@@ -29,17 +29,6 @@ def signed(value: float, *, decimals: int = 2) -> str:
     if not float(text):
         return text
     return f"{'−' if value < 0 else '+'}{text}"
-
-
-def size(n_bytes: int) -> str:
-    """Format a size in the largest fitting unit.
-
-    >>> size(812), size(81_234), size(20_000_000)
-    ('812 bytes', '81.2 KB', '20 MB')
-    """
-    if n_bytes < 1000:
-        return counted(n_bytes, "byte")
-    return f"{n_bytes / 1e3:.3g} KB" if n_bytes < 1e6 else f"{n_bytes / 1e6:.3g} MB"
 
 
 def duration(seconds: float | None) -> str:

@@ -43,6 +43,18 @@ class SiteForm(forms.Form):
         return urlencode({name: str(value) for name, value in asked.items() if value})
 
 
+def confirmation() -> forms.BooleanField:
+    """Return the tick that every step without a way back asks for."""
+    return forms.BooleanField(
+        label="I know that this cannot be undone.",
+        error_messages={"required": "Confirm that this cannot be undone: tick the box."},
+    )
+
+
+class ConfirmForm(SiteForm):
+    confirm = confirmation()
+
+
 class DescriptionForm(SiteForm):
     description = forms.CharField(
         required=False,

@@ -3,7 +3,7 @@
 from django.urls import include, path, register_converter
 
 from leaderboard.http_caching import cacheable
-from leaderboard.web.account import data_views, team_views, token_views
+from leaderboard.web.account import data_views, overview_views, team_views, token_views
 from leaderboard.web.boards import board_views, export_views, public_assets
 from leaderboard.web.charts import chart_views, paper_charts
 from leaderboard.web.compare import compare_views
@@ -18,6 +18,7 @@ from leaderboard.web.maintain import (
     queue_views,
     quota_views,
     split_views,
+    team_list_views,
 )
 from leaderboard.web.methods import method_views
 from leaderboard.web.submissions import submission_views
@@ -94,6 +95,7 @@ urlpatterns = [
     path("team/leave/", team_views.leave, name="leave_team"),
     path("team/members/<uuid:handle>/hand-over/", team_views.hand_over, name="hand_over_team"),
     path("team/members/<uuid:handle>/remove/", team_views.remove, name="remove_member"),
+    path("account/", overview_views.overview, name="account"),
     path("account/data/", data_views.data, name="account_data"),
     path("account/data.json", data_views.download, name="account_data_download"),
     path("tokens/", token_views.token_page, name="tokens"),
@@ -135,6 +137,7 @@ urlpatterns = [
         quota_views.end_admission,
         name="maintain_admission_end",
     ),
+    path("maintain/teams/", team_list_views.team_list, name="maintain_teams"),
     path("maintain/teams/<uuid:team_id>/", moderation_views.team, name="maintain_team"),
     path(
         "maintain/actions/<slug:action_name>/<slug:subject_id>/",

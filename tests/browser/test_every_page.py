@@ -100,7 +100,7 @@ def test_no_page_of_maintainers_has_a_fault(new_page: NewPage, site: Site, known
     assert {"/maintain/", "/maintain/queue/", "/maintain/quotas/", team, f"{team}val/end/"} <= set(desk)
     draft = [f"/maintain/val/editions/2/{part}" for part in ("", "publish/", "discard/")]
     views = [f"/maintain/queue/?state={state}" for state in ("failed", "waiting")]
-    assert list(inspected(page, [*desk, *draft, *views, "/maintain/quotas/?team=owls"])) == []
+    assert list(inspected(page, [*desk, *draft, *views, "/maintain/teams/?team=owls"])) == []
 
 
 def test_no_page_that_says_what_was_wrong_has_a_fault(browser: Browser, site: Site) -> None:

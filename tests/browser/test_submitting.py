@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 import evaluator
+from evaluator.counting import file_size
 from tests.browser.chromium import tab_to
 from tests.browser.conftest import MAX_PREDICTIONS_BYTES, PASSWORD, NewPage, sign_up, submit
 from tests.browser.site import predictions, worker
@@ -62,7 +63,7 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     tab_to(page, "Prediction file")
     # The dialogue that Enter opens here is the browser's own, and headless it does not always come.
     page.set_input_files("input[type=file]:focus", path)
-    expect(page.locator("#chosen")).to_have_text(f"{path.stat().st_size:,} bytes")
+    expect(page.locator("#chosen")).to_have_text(file_size(path.stat().st_size))
     tab_to(page, "Submit")
     press("Enter")
     page.wait_for_url("**/submissions/*/")
@@ -169,7 +170,8 @@ def check_and_correct(page: Page, truth: evaluator.GroundTruth) -> None:
         page.get_by_role("link", name="Template of test").click()
     field.set_input_files(taken.value.path())
     expect(page.locator("#checked .bad")).to_have_text(
-        "This is the empty template: 1,200 values to be filled in. The server would reject the file."
+        "This is the empty template: all 1,200 values are null; expected a number for every sequence. "
+        "The server would reject the file."
     )
     expect(page.get_by_role("button", name="Submit anyway")).to_be_visible()
     good = {"name": "p.json", "mimeType": "application/json", "buffer": predictions(truth, factor=1.7)}
@@ -189,7 +191,7 @@ def check_and_correct(page: Page, truth: evaluator.GroundTruth) -> None:
     page.wait_for_url("**/submissions/*/")
 
 
-LEFT_TO_THE_SERVER = "The server checks this file once it is sent."
+LEFT_TO_THE_SERVER = "The server checks {} once it is sent."
 REJECTED = "The server would reject the file."
 ANOTHER_NUMBER = "test expects 1,200, one for each sequence. The server would reject the file."
 ONE_LESS = json.dumps({str(row): 2.5 for row in range(1_199)}).encode()
@@ -210,9 +212,9 @@ SENTENCES: dict[str, tuple[bytes, str]] = {
         ONE_LESS,
         f"The file has 1,199 predictions; {ANOTHER_NUMBER}",
     ),
-    "not a number": (ONE_LESS.replace(b"2.5", b"NaN"), LEFT_TO_THE_SERVER),
-    "a table": (b"anno_id,ttc\n0,2.5\n", LEFT_TO_THE_SERVER),
-    "an archive": (gzip.compress(ONE_LESS), LEFT_TO_THE_SERVER),
+    "not a number": (ONE_LESS.replace(b"2.5", b"NaN"), LEFT_TO_THE_SERVER.format("this file")),
+    "a table": (b"anno_id,ttc\n0,2.5\n", LEFT_TO_THE_SERVER.format("a CSV file")),
+    "an archive": (gzip.compress(ONE_LESS), LEFT_TO_THE_SERVER.format("a gzip file")),
 }
 
 
@@ -225,7 +227,7 @@ def test_a_file_that_cannot_be_good_is_named_before_it_is_sent(
         chosen = {"name": "p.json", "mimeType": "application/json", "buffer": data}
         page.get_by_label("Prediction file").set_input_files(chosen)
         expect(page.locator("#checked")).to_have_text(sentence)
-        label = "Submit" if sentence == LEFT_TO_THE_SERVER else "Submit anyway"
+        label = "Submit anyway" if sentence.endswith(REJECTED) else "Submit"
         expect(page.locator(".actions button")).to_have_text(label)
 
 
@@ -278,7 +280,7 @@ def test_file_over_the_limit_is_stopped_before_it_is_sent(page: Page, truth: eva
     field = page.get_by_label("Prediction file")
     page.get_by_label("Method", exact=True).fill("Large")
     field.set_input_files({"name": "p.json", "mimeType": "application/json", "buffer": b"1" * 250_000})
-    sentence = f"The file has 250,000 bytes; expected at most {MAX_PREDICTIONS_BYTES:,} (0.2 MB)."
+    sentence = f"The file has 250 kB; expected at most {MAX_PREDICTIONS_BYTES // 1000} kB."
     expect(page.locator("#checked .bad")).to_have_text(sentence)
     page.get_by_role("button", name="Submit").click()
     assert field.evaluate("e => e.validationMessage") == sentence

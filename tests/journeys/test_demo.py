@@ -95,7 +95,10 @@ def test_the_demo_shows_scored_submissions_survives_a_dead_worker_and_ends_clean
         site = Site(url=url, directory=tmp_path, environment={})
         visitor = Visitor(site)
         answer = visitor.post_form("/accounts/login/", {"login": login[1], "password": login[2]})
-        assert answer.url.path == "/submit/"
+        assert answer.url.path == "/submissions/"
+        maintainer = Visitor(site)
+        maintainer.post_form("/accounts/login/", {"login": "maintainer@example.org", "password": login[2]})
+        assert "Queue" in maintainer.text_of("/maintain/")
         assert "simulated" in visitor.text_of("/board/demo/").lower()
         assert f"pip install {url}/dist/tsttc-" in visitor.text_of("/dist/")
         assert "anno_id" in visitor.text_of("/docs/search/?q=anno_id")

@@ -120,6 +120,7 @@ LINES: dict[str, Line] = {
     "leave_team": line(POST="in 302 302 422 404 in in"),
     "hand_over_team": line(POST="in 404 422 302 404 in in"),
     "remove_member": line(POST="in 404 422 302 404 in in"),
+    "account": line(GET=SIGNED_IN),
     "mails": line(GET=SIGNED_IN, POST="in 302 302 302 302 in in"),
     "tokens": line(GET=SIGNED_IN, POST="in 422 422 422 422 in in"),
     # Everybody has tokens of their own, the one of nobody that is named here is not there.
@@ -144,6 +145,7 @@ LINES: dict[str, Line] = {
     "maintain_admit": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_admission_end": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_splits": line(GET=KEEPERS),
+    "maintain_teams": line(GET=KEEPERS),
     "maintain_team": line(GET=KEEPERS),
     "maintain_action": line(GET=KEEPERS, POST="in 404 404 404 422 in in", at={"action_name": "rename-team"}),
     "maintain_published": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),

@@ -63,7 +63,7 @@ class Command(BaseCommand):
         banner = (
             f"\nThe leaderboard is at {address}{board}\n{login.getvalue()}"
             f"{'Its ground truth is simulated. ' if is_simulated else ''}Ctrl-C ends it. "
-            f"Logs and mail are in {settings.DATA_DIR / 'logs'}\n"
+            f"Logs are in {settings.DATA_DIR / 'logs'}, mails in {settings.DATA_DIR / 'mail'}\n"
         )
         try:
             running = processes(host, port, address=address)

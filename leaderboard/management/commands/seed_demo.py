@@ -18,3 +18,4 @@ class Command(RefusingCommand):
             raise CommandError("The demo creates an account and prints its password; not for production.")
         password = seed.seed(now=timezone.now(), password_path=settings.DATA_DIR / "demo-password")
         self.stdout.write(f"Sign in as {seed.DEMO_EMAIL} with the password {password}")
+        self.stdout.write(f"Maintain as {seed.MAINTAINER_EMAIL} with the same password")

@@ -46,6 +46,11 @@ class AccountAdapter(DefaultAccountAdapter):
     error_messages = {
         **DefaultAccountAdapter.error_messages,
         "incorrect_code": "The code is wrong; expected the code of the last mail that we sent for this.",
+        # As long as ACCOUNT_RATE_LIMITS says.
+        "too_many_login_attempts": "Too many failed sign-ins. Try again in 5 minutes, or reset the password.",
+        "too_many_codes": "Too many wrong codes. Try again in 5 minutes.",
+        "too_many_codes_today": "Too many wrong codes. Try again tomorrow.",
+        "too_many_logins_anywhere": "Too many failed sign-ins. Try again in an hour, or reset the password.",
     }
 
     def send_mail(self, template_prefix: str, email: str, context: dict[str, Any]) -> None:
@@ -72,7 +77,7 @@ class AccountAdapter(DefaultAccountAdapter):
         usage = ratelimit.consume(request, app="allauth.account", action="login_failed_anywhere", key=login)
         if not usage:
             self._rollback_login_failed_rl_usage()
-            raise self.validation_error("too_many_login_attempts")
+            raise self.validation_error("too_many_logins_anywhere")
         # A password that turns out to be right takes back all that was counted for it.
         self._login_failed_rl_usage.usage.extend(usage.usage)
 

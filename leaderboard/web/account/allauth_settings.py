@@ -10,6 +10,8 @@ SETTINGS: Final[dict[str, Any]] = {
     "ACCOUNT_SIGNUP_FIELDS": ["email*", "password1*", "password2*"],
     "ACCOUNT_SIGNUP_FORM_CLASS": f"{_HERE}.team_views.SignupNameForm",
     "ACCOUNT_SESSION_REMEMBER": True,
+    # Who is new has no submissions to come back to.
+    "ACCOUNT_SIGNUP_REDIRECT_URL": "/submit/",
     "ACCOUNT_ADAPTER": f"{_HERE}.accounts.AccountAdapter",
     "ACCOUNT_FORMS": {
         "signup": f"{_HERE}.accounts.SignupForm",

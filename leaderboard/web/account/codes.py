@@ -68,9 +68,9 @@ def _count_one(request: HttpRequest, user: User) -> ratelimit.RateLimitUsage:
             usage.usage.extend(anywhere.usage)
         else:
             usage.rollback()
-            usage = None
+            raise account_adapter().validation_error("too_many_codes_today")
     if not usage:
-        raise account_adapter().validation_error("too_many_login_attempts")
+        raise account_adapter().validation_error("too_many_codes")
     return usage
 
 

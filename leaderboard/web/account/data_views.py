@@ -74,7 +74,9 @@ _CHOICES: Final = [(kind.value, kind.label) for kind in MailKind if kind is not 
 
 
 class MailsForm(SiteForm):
-    wanted = forms.MultipleChoiceField(label="Send me a mail about", choices=_CHOICES, required=False)
+    wanted = forms.MultipleChoiceField(
+        label="Email me about", choices=_CHOICES, required=False, widget=forms.CheckboxSelectMultiple
+    )
 
 
 @own_form

@@ -28,8 +28,10 @@ class TokenForm(SiteForm):
         error_messages={"required": "The token has no name; expected what it is for."},
     )
     scopes = forms.MultipleChoiceField(
+        label="Scope",
+        widget=forms.CheckboxSelectMultiple,
         choices=[
-            (Scope.SUBMIT, "submit: submit and withdraw files, edit and publish methods"),
+            (Scope.SUBMIT, "submit: submit and withdraw files, edit methods and publish them for good"),
             (Scope.READ, "read: read results"),
         ],
         initial=list(Scope.values),

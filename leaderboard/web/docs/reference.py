@@ -7,12 +7,12 @@ from typing import Any, Final
 
 from django.conf import settings
 
+from evaluator.counting import file_size
 from evaluator.metrics.protocol import PROTOCOLS, Protocol
 from evaluator.problems import PROBLEM_CODES
 from leaderboard.boards import listing
 from leaderboard.models import Split
 from leaderboard.quotas import admissions
-from leaderboard.web.formatting import size
 
 # What only maintainers meet, when they import ground truth.
 GROUND_TRUTH_CODES: Final = frozenset(
@@ -63,7 +63,7 @@ def docs(splits: Sequence[Split], *, now: datetime) -> dict[str, Any]:
         "shared_end": next((f"{end:g}" for end in ends if ends.count(end) > 1), ""),
         "follows_toolkit": _follows_toolkit(protocol),
         "boundaries": [boundary.replace("-", "−") for boundary in protocol.boundaries],
-        "max_size": size(settings.MAX_PREDICTIONS_BYTES),
+        "max_size": file_size(settings.MAX_PREDICTIONS_BYTES),
         "problem_codes": [
             (code, meaning) for code, meaning in PROBLEM_CODES.items() if code not in GROUND_TRUTH_CODES
         ],

@@ -60,7 +60,7 @@ def _dates(
     if reader.is_authenticated:
         return [(offer.split, offer.sentence) for offer in offers_for(reader, now=now)]
     return [
-        (split, admissions.sentence_of(split, now=now) or f"Submissions to {split.pk} are open.")
+        (split, admissions.sentence_of(split, now=now) or f"Submissions to {split.title} are open.")
         for split in splits
     ]
 

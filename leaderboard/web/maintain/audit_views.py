@@ -2,11 +2,10 @@
 
 import itertools
 import json
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
 from datetime import UTC, date, datetime, time, timedelta
 from functools import partial
-from typing import Any, Final
+from typing import Any
 
 from django import forms
 from django.core.paginator import Paginator
@@ -17,6 +16,7 @@ from django.views.decorators.http import require_safe
 from leaderboard import audit
 from leaderboard.models import AuditEvent
 from leaderboard.web.forms import SiteForm
+from leaderboard.web.maintain import audit_tables
 from leaderboard.web.maintain.maintainer_views import maintainers_only
 
 DAY = timedelta(days=1)
@@ -32,17 +32,21 @@ def _day(label: str) -> forms.DateField:
     )
 
 
-def _occurring(name: str) -> list[tuple[str, str]]:
+def _occurring(name: str, words_of: Callable[[str], str]) -> list[tuple[str, str]]:
     words = AuditEvent.objects.order_by(name).values_list(name, flat=True).distinct()
-    return [("", "any"), *((word, word) for word in words)]
+    return [("", "any"), *((word, words_of(word)) for word in words)]
 
 
 class AuditFilter(SiteForm):
     """Actor, verb, noun, and days in UTC, both included."""
 
     actor = forms.CharField(label="Actor (part of the email address)", required=False, max_length=254)
-    verb = forms.ChoiceField(label="Action", required=False, choices=partial(_occurring, "verb"))
-    noun = forms.ChoiceField(label="Object type", required=False, choices=partial(_occurring, "noun"))
+    verb = forms.ChoiceField(
+        label="Action", required=False, choices=partial(_occurring, "verb", audit_tables.verb_words)
+    )
+    noun = forms.ChoiceField(
+        label="Object type", required=False, choices=partial(_occurring, "noun", audit_tables.noun_words)
+    )
     noun_id = forms.CharField(label="Object ID (prefix)", required=False, max_length=80)
     since = _day("From")
     until = _day("To")
@@ -62,7 +66,6 @@ def _midnight(day: date) -> datetime:
 
 
 PER_PAGE = 100
-DIGEST: Final = re.compile(r"(sha256:[0-9a-f]{8})[0-9a-f]{56}")
 
 
 @maintainers_only
@@ -72,9 +75,7 @@ def events(request: HttpRequest) -> HttpResponse:
     if not asked.is_valid():
         return render(request, "maintain/audit.html", {"form": asked}, status=400)
     page = Paginator(audit.events(**asked.wanted()), PER_PAGE).get_page(request.GET.get("page"))
-    names = audit.names_in(page)
-    rows = [(event, _readable_details(event, names)) for event in page]
-    context = {"form": asked, "page": page, "query": asked.query(), "rows": rows}
+    context = {"form": asked, "page": page, "query": asked.query(), "rows": audit_tables.audit_rows(page)}
     return render(request, "maintain/audit.html", context)
 
 
@@ -92,14 +93,6 @@ def export(request: HttpRequest) -> HttpResponse | StreamingHttpResponse:
     )
 
 
-def _readable_details(event: AuditEvent, names: Mapping[str, str]) -> list[tuple[str, str]]:
-    details = {
-        name: ", ".join(map(str, value)) if isinstance(value, list) else value
-        for name, value in event.details.items()
-    } | {name: text or "(blanked)" for name, text in _named(event, names).items()}
-    return [(name, DIGEST.sub(r"\1…", str(text))) for name, text in details.items() if text not in ("", None)]
-
-
 def _rows(asked: AuditFilter) -> Iterator[dict[str, Any]]:
     # A few at a time: the log grows with the site's age.
     events = audit.events(**asked.wanted()).iterator(chunk_size=1000)
@@ -111,15 +104,10 @@ def _rows(asked: AuditFilter) -> Iterator[dict[str, Any]]:
                 "at": event.at.isoformat(),
                 "actor": event.actor.email if event.actor else None,
                 **{name: getattr(event, name) for name in ("verb", "noun", "noun_id", "details")},
-                "names": _named(event, names),
+                "names": audit_tables.named(event, names),
                 "previous_hash": event.previous_hash,
                 "hash": event.hash,
             }
-
-
-def _named(event: AuditEvent, names: Mapping[str, str]) -> dict[str, str]:
-    texts = {name: value for name, value in event.details.items() if isinstance(value, str)}
-    return {name: names[value] for name, value in texts.items() if value in names}
 
 
 def _json_list(rows: Iterator[dict[str, Any]]) -> Iterator[str]:

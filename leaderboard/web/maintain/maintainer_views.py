@@ -14,9 +14,9 @@ from django.views.decorators.http import require_safe
 from django_htmx.http import HttpResponseClientRefresh
 
 from evaluator.tables.formats import csv_lines
-from leaderboard.editions import corrections, history, preview
+from leaderboard.editions import corrections, history, preview, splits
 from leaderboard.errors.refusals import NotMaintainer
-from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, User
+from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, Team, User
 from leaderboard.pages import texts
 from leaderboard.web.boards import edition_tables
 from leaderboard.web.decorators import asks_first
@@ -62,10 +62,10 @@ def maintainers_form(view: View) -> View:
 @require_safe
 def hub(request: HttpRequest) -> HttpResponse:
     """Show every split with its board, editions in preparation and failures."""
-    splits = Split.objects.select_related("current_edition__ground_truth")
+    rows = Split.objects.select_related("current_edition__ground_truth")
     desks = [
         (desk, [edition_tables.running(*each) for each in desk["in_preparation"]])
-        for desk in map(history.maintainer_overview, splits)
+        for desk in map(history.maintainer_overview, rows)
     ]
     is_running = any(not shown["is_final"] for _, running in desks for shown in running)
     context = {
@@ -73,6 +73,9 @@ def hub(request: HttpRequest) -> HttpResponse:
         "is_running": is_running,
         "queue": queue_tables.totals(),
         "n_overrides": QuotaOverride.objects.count(),
+        "n_teams": Team.objects.count(),
+        "n_published": splits.quoted().count(),
+        "n_pages": len(texts.PAGES),
         "n_events": AuditEvent.objects.count(),
         "has_imprint": texts.current(texts.IMPRINT) is not None,
     }

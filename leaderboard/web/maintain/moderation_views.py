@@ -20,7 +20,7 @@ from leaderboard.moderation import forgetting, hiding
 from leaderboard.moderation.hiding import MAX_REASON
 from leaderboard.people import teams, tokens
 from leaderboard.people.names import MAX_NAME
-from leaderboard.web.forms import SiteForm
+from leaderboard.web.forms import SiteForm, confirmation
 from leaderboard.web.maintain.maintainer_forms import reason_field
 from leaderboard.web.maintain.maintainer_views import (
     form_page,
@@ -38,16 +38,33 @@ class ActionForm(SiteForm):
     )
 
 
+class FinalActionForm(ActionForm):
+    confirm = confirmation()
+
+
 class RenameForm(ActionForm):
+    how = forms.ChoiceField(
+        label="What to do",
+        choices=[("rename", "Rename: give it the name below"), ("mask", "Mask: give it a neutral name")],
+        widget=forms.RadioSelect,
+        error_messages={"required": "Nothing was chosen; expected to rename or to mask."},
+    )
     name = forms.CharField(
         label="New name",
         required=False,
         max_length=MAX_NAME,
-        help_text="Empty: a name that says nothing, such as Team 3f9c2a or Method 3f9c2a.",
+        help_text="To rename. A masked name is made by the site, such as Team 3f9c2a or Method 3f9c2a.",
         widget=forms.TextInput(attrs={"autocomplete": "off"}),
     )
 
-    field_order = ("name", "reason")
+    field_order = ("how", "name", "reason")
+
+    def clean(self) -> dict[str, Any]:
+        fields: dict[str, Any] = super().clean() or {}
+        is_masked = fields.pop("how", "") == "mask"
+        if not is_masked and not fields.get("name") and not self.errors:
+            self.add_error("name", "No new name was given; expected one, or to mask the present one.")
+        return fields | ({"name": ""} if is_masked else {})
 
 
 class MoveForm(ActionForm):
@@ -135,9 +152,9 @@ ACTIONS: Final[Mapping[str, Action]] = {
     "withdraw": Action(
         Submission,
         "Withdraw the submission",
-        "Its values leave the board; its row stays, marked with the date. This cannot be undone.",
+        "Its scores leave the board; its row stays, marked with the date. This cannot be undone.",
         "Withdraw",
-        ActionForm,
+        FinalActionForm,
         lambda subject, **arguments: hiding.withdraw_entry(submission=subject, is_hidden=False, **arguments),
     ),
     "hide": Action(
@@ -146,7 +163,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "It leaves all boards, also those as of earlier dates. Its team still sees it as withdrawn. "
         "This cannot be undone.",
         "Hide",
-        ActionForm,
+        FinalActionForm,
         lambda subject, **arguments: hiding.withdraw_entry(submission=subject, is_hidden=True, **arguments),
     ),
     "appoint-owner": Action(
@@ -187,7 +204,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "The account, its addresses, tokens and invitations are deleted, also file names and notes. "
         "A team without other members loses its name. Scores stay. This cannot be undone.",
         "Forget person",
-        ActionForm,
+        FinalActionForm,
         lambda subject, **arguments: forgetting.forget(user=subject, **arguments),
     ),
 }
@@ -229,10 +246,11 @@ def action(request: HttpRequest, action_name: str, subject_id: str) -> HttpRespo
     team = _team_of(subject)
     if form.is_valid():
         with form.refusals():
-            arguments = {**form.cleaned_data, "actor": maintainer_of(request), "now": timezone.now()}
+            given = {name: value for name, value in form.cleaned_data.items() if name != "confirm"}
+            arguments = {**given, "actor": maintainer_of(request), "now": timezone.now()}
             chosen.do(subject=subject, **arguments)
-            messages.success(request, f"Done: {chosen.heading[:1].lower()}{chosen.heading[1:]}.")
-            return redirect("maintain_team", team.pk) if team else redirect("maintain_quotas")
+            messages.success(request, f"{chosen.heading}: done.")
+            return redirect("maintain_team", team.pk) if team else redirect("maintain_teams")
     about = {"action": chosen, "subject": _name_of(subject), "team": team}
     return form_page(request, "maintain/action.html", form, **about)
 

@@ -1,61 +1,19 @@
 """Published results, for maintainers: those on the boards, and a form to add a paper's."""
 
-from typing import Any
-
-from django import forms
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect
 from django.utils import timezone
 
 from evaluator.metrics.protocol import known_metrics
-from leaderboard.editions import papers, splits
-from leaderboard.editions.papers import BadDocument
-from leaderboard.errors.refusals import Refused
+from leaderboard.editions import splits
 from leaderboard.models import PublishedResult
-from leaderboard.web.forms import SiteForm
-from leaderboard.web.maintain.maintainer_forms import reason_field
 from leaderboard.web.maintain.maintainer_views import (
     form_page,
     maintainer_of,
     maintainers_form,
 )
-
-
-class PaperForm(SiteForm):
-    file = forms.FileField(
-        label="Document",
-        help_text="JSON with source, columns, methods and results.",
-        widget=forms.FileInput(attrs={"accept": ".json,application/json"}),
-        error_messages={
-            "required": "No document was sent; expected a JSON file.",
-            "empty": "The document is empty; expected JSON.",
-        },
-    )
-    is_replacing = forms.BooleanField(
-        label="Replace",
-        required=False,
-        help_text="Put the new row in the place of one with the same slug and other content.",
-    )
-
-    def __init__(self, request: HttpRequest) -> None:
-        sent: tuple[Any, Any] = (None, None)
-        super().__init__(*((request.POST, request.FILES) if request.method == "POST" else sent))
-
-    def refuse(self, refusal: Exception) -> None:
-        """Show every problem of the document at its field."""
-        for problem in refusal.problems if isinstance(refusal, BadDocument) else ():
-            self.add_error("file", problem)
-        if not isinstance(refusal, BadDocument):
-            super().refuse(refusal)
-
-    def document(self) -> dict[str, Any]:
-        """Parse the document. Raises `BadDocument`."""
-        return papers.parse(self.cleaned_data["file"].read(papers.MAX_BYTES + 1))
-
-
-class RemovalForm(SiteForm):
-    reason = reason_field("One sentence for the audit log.", max_length=splits.MAX_REASON)
+from leaderboard.web.maintain.published_forms import PaperForm, RemovalForm, RowForm, example
 
 
 @maintainers_form
@@ -78,24 +36,30 @@ def remove(request: HttpRequest, split: str, slug: str) -> HttpResponse:
 
 @maintainers_form
 def published(request: HttpRequest) -> HttpResponse:
-    form = PaperForm(request)
+    """Show the rows, and a form for one row beside one for a document; the button says which was sent."""
+    is_row = request.POST.get("step") == "row"
+    sent = (request.POST, request.FILES) if request.method == "POST" else (None, None)
+    row_form = RowForm(sent[0] if is_row else None, prefix="row")
+    form: RowForm | PaperForm = PaperForm(*((None, None) if is_row else sent))
+    context = {
+        "row_form": row_form,
+        "document_form": form,
+        "example": example(),
+        "rows": [(row, _overall_words(row)) for row in splits.quoted()],
+    }
+    form = row_form if is_row else form
     if form.is_valid():
-        try:
+        with form.refusals():
             done = splits.import_published(
                 document=form.document(),
                 now=timezone.now(),
                 is_replacing=form.cleaned_data["is_replacing"],
                 actor=maintainer_of(request),
             )
-        except Refused as refusal:
-            form.refuse(refusal)
-        else:
             words = (f"{len(names)} {outcome}" for outcome, names in vars(done).items())
             messages.success(request, f"Rows: {', '.join(words)}.")
             return redirect("maintain_published")
-    return form_page(
-        request, "maintain/published.html", form, rows=[(row, _overall_words(row)) for row in splits.quoted()]
-    )
+    return form_page(request, "maintain/published.html", form, **context)
 
 
 def _overall_words(row: PublishedResult) -> str:

@@ -42,7 +42,7 @@ def totals(*, split: str = "") -> dict[str, Any]:
     counts = {name: by_status.get(state.status, (0, None))[0] for name, state in STATES.items()}
     _, oldest_at = by_status.get(Status.QUEUED, (0, None))
     age = duration((clock.database_now() - oldest_at).total_seconds()) if oldest_at else ""
-    return {"counts": counts, "oldest_age": age}
+    return {"counts": counts, "n": sum(counts.values()), "oldest_age": age}
 
 
 def queue_table(*, state: str = "", split: str = "", number: Any = 1) -> dict[str, Any]:

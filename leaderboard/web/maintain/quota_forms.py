@@ -14,12 +14,6 @@ from leaderboard.web.maintain.maintainer_forms import reason_field
 _FOR_MAINTAINERS: Final = "One sentence for maintainers and the audit log. The team does not see it."
 
 
-class TeamLookup(SiteForm):
-    """A part of a team's name, or of a member's address."""
-
-    team = forms.CharField(label="Team, or email address of a person", required=False, max_length=254)
-
-
 class SpanField(forms.CharField):
     """A span of time as `spans.span` words it."""
 

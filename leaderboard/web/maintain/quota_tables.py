@@ -3,17 +3,11 @@
 from datetime import datetime
 from typing import Any
 
-from django.db.models import Prefetch, Q, QuerySet
-
 from leaderboard.models import Split, Team, User
 from leaderboard.models.quotas import QuotaRules
-from leaderboard.moderation import forgetting
-from leaderboard.people import names
 from leaderboard.quotas import usage
 from leaderboard.quotas.spans import span
 from leaderboard.web.formatting import grouped
-
-MAX_MATCHES = 50
 
 
 def rules_of(row: QuotaRules) -> dict[str, str]:
@@ -61,23 +55,6 @@ def team_rows(team: Team, *, viewer: User, now: datetime) -> list[dict[str, Any]
         }
         for split in Split.objects.all()
     ]
-
-
-def teams_like(text: str) -> list[Team]:
-    """Return teams with this text in their name or in a member's address; one more than are shown."""
-    by_address = Team.objects.filter(members__email__icontains=text).values("pk")
-    fits = Q(name__icontains=text) | Q(pk__in=by_address)
-    look = names.skeleton(text)
-    if look:
-        fits |= Q(look__contains=look)
-    members = Prefetch("members", User.objects.order_by("email"))
-    return list(Team.objects.filter(fits).prefetch_related(members).order_by("name")[: MAX_MATCHES + 1])
-
-
-def people_alone(text: str) -> QuerySet[User]:
-    """Return accounts without a team with this text in their address."""
-    alone = User.objects.filter(email__icontains=text, membership=None)
-    return alone.exclude(email__endswith=f"@{forgetting.NOWHERE}").order_by("email")[:MAX_MATCHES]
 
 
 def _most(count: int | None) -> str:

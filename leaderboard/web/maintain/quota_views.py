@@ -19,7 +19,7 @@ from leaderboard.web.maintain.maintainer_views import (
     maintainers_form,
     maintainers_only,
 )
-from leaderboard.web.maintain.quota_forms import EndForm, OverrideForm, TeamLookup
+from leaderboard.web.maintain.quota_forms import EndForm, OverrideForm
 
 PER_PAGE = 50
 
@@ -27,24 +27,16 @@ PER_PAGE = 50
 @maintainers_only
 @require_safe
 def quota_rules(request: HttpRequest) -> HttpResponse:
-    lookup = TeamLookup(request.GET)
-    text = lookup.cleaned_data["team"] if lookup.is_valid() else ""
-    matches = quota_tables.teams_like(text) if text else []
     overrides = QuotaOverride.objects.select_related("team", "set_by")
     overrides = overrides.order_by("split__position", "split", "team__name")
     page = Paginator(overrides, PER_PAGE).get_page(request.GET.get("page"))
     context = {
-        "form": lookup,
-        "text": text,
-        "teams": matches[: quota_tables.MAX_MATCHES],
-        "is_cut": len(matches) > quota_tables.MAX_MATCHES,
-        "people": quota_tables.people_alone(text) if text else [],
         "splits": [(split, quota_tables.rules_of(split)) for split in Split.objects.all()],
         "page": page,
         "overrides": [(row, quota_tables.rules_of(row)) for row in page],
         "are_off": not settings.QUOTAS,
     }
-    return render(request, "maintain/quotas.html", context, status=400 if lookup.errors else 200)
+    return render(request, "maintain/quotas.html", context)
 
 
 @maintainers_only

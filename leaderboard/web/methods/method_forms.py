@@ -9,7 +9,7 @@ from django.http import HttpRequest
 from leaderboard.methods import editing, visibility
 from leaderboard.methods.details import DETAILS, Detail
 from leaderboard.models import Method, Visibility
-from leaderboard.web.forms import DescriptionForm, SiteForm
+from leaderboard.web.forms import DescriptionForm, SiteForm, confirmation
 
 _NOT_SPECIFIED: Final = ("", "not specified")
 
@@ -80,7 +80,12 @@ class ShowForm(SiteForm):
         help_text="Optional, for anonymous methods: the day (UTC) on which the method becomes public.",
         widget=forms.DateInput(attrs={"type": "date"}),
     )
-    confirm = forms.BooleanField(required=False, label="I know that this cannot be undone.")
+    # The preview is a form, too, and asks for no tick.
+    confirm = confirmation()
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.fields["confirm"].required = False
 
     @classmethod
     def of_method(cls, request: HttpRequest, *, method: Method) -> "ShowForm":

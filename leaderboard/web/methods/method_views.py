@@ -11,12 +11,12 @@ from django.views.decorators.http import require_safe
 
 from leaderboard.boards import results, visibility_preview
 from leaderboard.boards.snapshots import splits_of
-from leaderboard.errors.refusals import Refused
 from leaderboard.methods import details, editing, visibility
 from leaderboard.models import Method, Split, Submission, User, Visibility
 from leaderboard.moderation import empty_methods
 from leaderboard.web.boards import export_views
 from leaderboard.web.decorators import own_form
+from leaderboard.web.forms import ConfirmForm
 from leaderboard.web.methods.method_forms import MethodForm, ShowForm
 from leaderboard.web.methods.result_tables import edition_groups, method_result
 
@@ -35,7 +35,6 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
         "visibility": row.visibility,
         "is_named": row.is_named_for(request.user),
         "is_mine": is_mine,
-        "can_be_deleted": is_mine and empty_methods.can_be_deleted(row),
         "method_id": row.pk,
         "results": [method_result(result) for result in achieved],
         "sent_to": sent_to,
@@ -73,17 +72,14 @@ def edit(request: HttpRequest, method_id: UUID) -> HttpResponse:
 def delete(request: HttpRequest, method_id: UUID) -> HttpResponse:
     """Delete an empty method after a page that explains it; for any other say why it stays."""
     own = _own(request, method_id)
-    refusal = None
-    if request.method == "POST":
-        try:
+    form = ConfirmForm.asked(request)
+    if form.is_valid():
+        with form.refusals():
             empty_methods.delete(method=own, actor=cast("User", request.user), now=timezone.now())
-        except Refused as fault:
-            refusal = fault
-        else:
             messages.success(request, f"{own.name} is deleted.")
             return redirect("submissions")
-    context = {"method": own, "refusal": refusal, "is_empty": empty_methods.can_be_deleted(own)}
-    return render(request, "methods/delete.html", context, status=422 if refusal else 200)
+    context = {"method": own, "form": form, "is_empty": empty_methods.can_be_deleted(own)}
+    return render(request, "methods/delete.html", context, status=422 if form.errors else 200)
 
 
 @own_form

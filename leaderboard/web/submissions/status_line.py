@@ -1,7 +1,7 @@
 """A submission's progress: its status line, what was truncated, and its problems."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Final
 
@@ -42,19 +42,28 @@ class StateLine:
     listing: str
 
 
-def state_line(progress: Progress, *, awaits_intervals: bool = False) -> StateLine:
+def state_line(
+    progress: Progress, *, awaits_intervals: bool = False, withdrawn_at: datetime | None = None
+) -> StateLine:
     """Make the status line. `awaits_intervals`: scored, and its intervals are expected."""
     more = "-intervals" if awaits_intervals else ""
     problems = tuple(progress.problems[:MAX_POINTS])
     is_whole = len(problems) == progress.n_problems
     return StateLine(
-        steps=steps(progress, awaits_intervals=awaits_intervals),
+        steps=_with_withdrawal(steps(progress, awaits_intervals=awaits_intervals), withdrawn_at),
         seen=f"{progress.state}-{progress.n_ahead}-{progress.started_at}-{progress.is_late}{more}",
         is_moving=awaits_intervals or not progress.is_final,
         truncation=truncation(progress.truncated),
         problems=problems,
-        listing="" if is_whole else f"Equal problems share a point; at most {MAX_POINTS} points are listed.",
+        listing="" if is_whole else f"Identical problems are grouped; the first {MAX_POINTS} are listed.",
     )
+
+
+def _with_withdrawal(shown: tuple[Step, ...], at: datetime | None) -> tuple[Step, ...]:
+    # What was cancelled has that for its end already.
+    if at is None or shown[-1].state != "now" or shown[-1].label == _ENDS[Status.CANCELLED]:
+        return shown
+    return (*shown[:-1], replace(shown[-1], state="done"), Step("Withdrawn", "now", at))
 
 
 def steps(progress: Progress, *, awaits_intervals: bool = False) -> tuple[Step, ...]:

@@ -32,6 +32,7 @@ from leaderboard.submissions.progress import Progress, progress_of
 from leaderboard.web.boards import edition_tables
 from leaderboard.web.charts import analysis_charts
 from leaderboard.web.decorators import own_form, own_page
+from leaderboard.web.forms import ConfirmForm
 from leaderboard.web.lookups import split_or_404
 from leaderboard.web.methods import result_tables
 from leaderboard.web.submissions import outcome_tables
@@ -121,13 +122,17 @@ def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     own = Submission.objects.filter(method__team__memberships__user=user)
     row = get_object_or_404(own.select_related("method__team", "split"), pk=submission_id)
     before = progress_of(row)
-    if request.method == "POST" and intake.withdraw(submission=row, actor=user, now=timezone.now()):
-        done = "withdrawn" if before.is_final else "cancelled"
-        messages.success(request, f"The submission is {done}.")
-    if request.method == "POST" or not outcomes.can_be_withdrawn(row):
+    if not outcomes.can_be_withdrawn(row):
         return redirect("submission", row.pk)
-    flags = {"is_waiting": not before.is_final, "is_failed": before.fault_is_ours}
-    return render(request, "submissions/withdraw.html", {"submission": row, **flags})
+    form = ConfirmForm.asked(request)
+    if form.is_valid():
+        if intake.withdraw(submission=row, actor=user, now=timezone.now()):
+            done = "withdrawn" if before.is_final else "cancelled"
+            messages.success(request, f"The submission is {done}.")
+        return redirect("submission", row.pk)
+    context = {"submission": row, "is_waiting": not before.is_final, "is_failed": before.fault_is_ours}
+    status = 422 if form.errors else 200
+    return render(request, "submissions/withdraw.html", {"form": form, **context}, status=status)
 
 
 def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, Progress, StateLine]:
@@ -140,7 +145,8 @@ def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, P
     row = get_object_or_404(rows, pk=submission_id)
     progress = progress_of(row)
     awaits = outcomes.awaits_intervals(row, progress, now=timezone.now())
-    return row, progress, state_line(progress, awaits_intervals=awaits)
+    shown = state_line(progress, awaits_intervals=awaits, withdrawn_at=row.withdrawn_at)
+    return row, progress, shown
 
 
 def _outcome(request: HttpRequest, row: Submission, progress: Progress) -> dict[str, Any]:

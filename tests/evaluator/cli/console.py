@@ -186,7 +186,7 @@ def put_more_documented_answers(site: RecordedSite) -> None:
         {"split": "test", "limit": 3, "used": 3, "left": 0, "is_open": False, "window_s": window_s}
         | {
             "next_slot_at": "2026-12-04T09:13:00Z",
-            "sentence": "Your team has used 3 submissions to test, its quota for 30 days; the next slot "
+            "sentence": "Your team has used 3 submissions to Test, its quota for 30 days; the next slot "
             "opens at 2026-12-04 09:13 UTC.",
         },
     ]

@@ -59,6 +59,21 @@ def test_submissions_are_listed_page_after_page_and_filtered(tsttc: Tsttc, site:
     assert [row["id"] for row in rows] == [REJECTED_ID]
 
 
+def test_status_without_an_id_is_that_of_the_latest_submission(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put("GET /api/v1/submissions", Reply(SUBMISSIONS), Reply([]))
+    site.put(f"GET /api/v1/submissions/{ID}", Reply(SUBMISSIONS[0]))
+    assert "Foo++ on val" in tsttc("status").stdout
+    assert "Your team has no submission yet" in tsttc("status").stderr
+
+
+def test_quota_says_of_a_split_without_a_next_slot_that_it_is_closed(
+    tsttc: Tsttc, site: RecordedSite
+) -> None:
+    row = {"split": "val", "limit": None, "used": 0, "left": None, "next_slot_at": None, "is_open": False}
+    site.put("GET /api/v1/quota", Reply([row]))
+    assert tsttc("quota").stdout.splitlines()[1].split() == ["val", "–", "any", "number", "closed"]
+
+
 def test_withdraw_asks_first_and_says_what_became_of_it(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(f"GET /api/v1/submissions/{ID}", Reply(SUBMISSIONS[0]))
     site.put(f"POST /api/v1/submissions/{ID}/withdraw", Reply(SUBMISSIONS[0] | {"state": "CANCELLED"}))

@@ -7,6 +7,7 @@ import pytest
 from evaluator import PROBLEM_CODES, Manifest, Problem, Rejected, read_predictions
 from evaluator.predictions.documents import parse
 from evaluator.predictions.loading import read_sent
+from evaluator.predictions.writing import template
 from tests.evaluator.faulty_files import CASES, GOOD, MANIFEST
 from tests.evaluator.worlds import flat, make_truth
 
@@ -28,7 +29,13 @@ def test_a_faulty_file_is_rejected_in_these_words(name: str) -> None:
 
 def test_a_file_over_the_limit_is_not_looked_at() -> None:
     problem = rejection(b"\xff" * 101, max_bytes=100).problems[0]
-    assert problem == Problem("too-large", "The file has 101 bytes; expected at most 100.")
+    assert problem == Problem("too-large", "The file has 101 bytes; expected at most 100 bytes.")
+
+
+def test_the_empty_template_is_one_problem_not_one_for_each_sequence() -> None:
+    rejected = rejection(template(MANIFEST))
+    message = "This is the empty template: all 4 values are null; expected a number for every sequence."
+    assert (rejected.problems, rejected.n_problems) == ((Problem("not-a-number", message),), 1)
 
 
 def test_all_faults_are_reported_at_once() -> None:

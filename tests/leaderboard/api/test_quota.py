@@ -57,7 +57,7 @@ def test_an_exhausted_quota_is_a_429_that_says_when_to_come_back(edition: Editio
     assert response.status_code == 429
     assert response.headers["Content-Type"] == "application/problem+json"
     assert (body["code"], body["problems"][0]["where"]) == ("quota-exceeded", "split")
-    assert "used 1 submission to test, its quota for 2 hours" in body["detail"]
+    assert "used 1 submission to Test, its quota for 2 hours" in body["detail"]
     assert 7190 <= int(response.headers["Retry-After"]) <= 7200
     assert Submission.objects.count() == 1
     assert not quota_of(client)["is_open"]

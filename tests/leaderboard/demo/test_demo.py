@@ -71,7 +71,10 @@ def test_seeding_twice_adds_nothing_and_keeps_the_password(benchmark: None, tmp_
     assert seed.seed(now=NOW, password_path=path) == password
     assert [model.objects.count() for model in (User, Submission, Evaluation)] == counts
     assert User.objects.get(email=seed.DEMO_EMAIL).check_password(password)
-    others = User.objects.exclude(email=seed.DEMO_EMAIL)
+    maintainer = User.objects.get(email=seed.MAINTAINER_EMAIL)
+    assert maintainer.is_maintainer
+    assert maintainer.check_password(password)
+    others = User.objects.exclude(email__in=[seed.DEMO_EMAIL, seed.MAINTAINER_EMAIL])
     assert not any(user.has_usable_password() for user in others), "nobody signs in as the baselines' teams"
 
 

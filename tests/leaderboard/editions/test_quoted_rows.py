@@ -183,3 +183,48 @@ def test_the_page_imports_a_paper_with_missing_values_and_says_where_every_probl
         assert answer.status_code == 422
         assert sentence in assert_sound(answer).one("div", class_="wrong").text
     assert on_board()["Later"] == 2.0
+
+
+# --- the forms of the page ---------------------------------------------------------------------------------
+
+
+def test_the_example_on_the_page_can_be_pasted_as_it_is(keeper: Client, edition: Edition) -> None:
+    example = assert_sound(keeper.get(PAGE)).one("code", id="example").text
+    assert keeper.post(PAGE, {"text": example}).status_code == 302
+    assert on_board()["Later"] == 14.0
+
+
+ROW = {
+    "step": "row",
+    "row-split": "test",
+    "row-name": "Typed net",
+    "row-title": "A paper",
+    "row-authors": "L. Ater",
+    "row-year": "2026",
+    "row-url": "https://arxiv.org/abs/2601.00001",
+    "row-table": "Table 2",
+    "row-scores": "14.0 27 15.1 11.2 – 12.0 6.4 – – -",
+}
+
+
+def test_a_row_is_typed_in_without_a_document(keeper: Client, edition: Edition) -> None:
+    assert keeper.post(PAGE, ROW).status_code == 302
+    row = PublishedResult.objects.get(slug="typed-net")
+    assert (row.method_name, row.scores["mid"], row.scores["mid_negative"]) == ("Typed net", 14.0, None)
+
+
+@pytest.mark.parametrize(
+    ("field", "text", "sentence"),
+    [
+        ("url", "nowhere", "'nowhere'; expected an address that begins with http:// or https://."),
+        ("scores", "14.0 x", "'x'; expected a number such as 14.0, or a dash."),
+        ("scores", "14.0", "1 values; expected a list of 10, one for each of the columns."),
+        ("year", "1", "1; expected a year from 1950 to"),
+    ],
+)
+def test_what_is_wrong_in_a_typed_row_stands_at_its_field(
+    keeper: Client, edition: Edition, field: str, text: str, sentence: str
+) -> None:
+    answer = keeper.post(PAGE, ROW | {f"row-{field}": text})
+    assert answer.status_code == 422
+    assert sentence in assert_sound(answer).one("div", id=f"id_row-{field}_error").text

@@ -184,6 +184,17 @@ def test_a_withdrawn_entry_of_a_shown_method_leaves_a_stone(
     assert entry.withdrawn_at
 
 
+def test_an_anonymous_method_offers_to_be_made_public(
+    client: Client, sent: Submission, method: Method, owner: User
+) -> None:
+    change(method, "ANONYMOUS", owner)
+    client.force_login(owner)
+    for address in (f"/methods/{method.pk}/", f"/submissions/{sent.pk}/"):
+        words = [a.text for a in pages.get(client, address).one("main").all("a")]
+        assert "Make public…" in words
+        assert "Publish…" not in words
+
+
 # --- the page ----------------------------------------------------------------------------------------------
 
 

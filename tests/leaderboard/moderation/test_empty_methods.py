@@ -28,7 +28,7 @@ def test_the_method_of_a_broken_upload_is_deleted_its_file_stays_and_its_name_is
     page = pages.page(signed_in.get(address)).one("main")
     assert f"{address}delete/" in [a.attributes["href"] for a in page.all("a")]
     assert signed_in.get(f"{address}delete/").status_code == 200
-    done = pages.page(signed_in.post(f"{address}delete/", follow=True)).one("main")
+    done = pages.page(signed_in.post(f"{address}delete/", {"confirm": "on"}, follow=True)).one("main")
     assert "Broken Net is deleted." in done.text
     assert "deleted" in done.one("tbody").one("tr").text
     assert signed_in.get(address).status_code == 404
@@ -58,6 +58,18 @@ def test_what_has_a_score_waits_or_was_shown_stays(
     builders.score_all()
     assert not empty_methods.can_be_deleted(shown)
     assert Method.objects.existing().count() == Method.objects.count() == 2
+
+
+def test_what_cannot_be_deleted_leads_to_withdrawing(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
+    sent = builders.submit(owner, builders.predictions(edition), method="Scored", visibility="PRIVATE")
+    builders.score_all()
+    address = f"/methods/{sent.method_id}/"
+    (link,) = [a for a in pages.get(signed_in, address).one("main").all("a") if a.text == "Delete…"]
+    main = pages.get(signed_in, link.attributes["href"]).one("main")
+    (link,) = [a for a in main.all("a") if a.text == "withdraw its submissions"]
+    assert link.attributes["href"] == f"/submissions/?method={sent.method_id}"
 
 
 def test_a_deleted_method_comes_along_to_another_team_and_takes_no_name(

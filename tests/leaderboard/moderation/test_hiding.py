@@ -57,10 +57,10 @@ def addresses_with(client: Client, name: str, *more: str) -> list[str]:
 def do(keeper: Client, action: str, subject: object, **fields: str) -> None:
     address = f"/maintain/actions/{action}/{subject}/"
     assert_sound(keeper.get(address))
-    refused = keeper.post(address, {**fields, "reason": ""})
+    refused = keeper.post(address, {"confirm": "on", **fields, "reason": ""})
     assert refused.status_code == 422
     assert "No reason was given" in assert_sound(refused).one("div", class_="wrong").text
-    answer = keeper.post(address, {"reason": "A complaint.", **fields})
+    answer = keeper.post(address, {"reason": "A complaint.", "confirm": "on", **fields})
     assert answer.status_code == 302, assert_sound(answer).one("main").text
 
 
@@ -72,8 +72,8 @@ def test_renamed_and_masked_names_are_gone_from_board_exports_feed_search_and_th
     past = (f"/board/test/?at={at}", f"/board/test.csv?at={at}", f"/methods/{sent.method_id}/")
     assert len(addresses_with(visitor, "Rude Name", *past)) >= 10
     assert len(addresses_with(visitor, "Owls", *past)) >= 8
-    do(keeper, "rename-method", sent.method_id, name="")
-    do(keeper, "rename-team", sent.method.team_id, name="Polite Owls 2")
+    do(keeper, "rename-method", sent.method_id, how="mask")
+    do(keeper, "rename-team", sent.method.team_id, how="rename", name="Polite Owls 2")
     assert addresses_with(visitor, "Rude Name", *past) == []
     assert addresses_with(visitor, f"Method {sent.method_id.hex[:6]}", *past) != []
     assert "Polite Owls 2" in visitor.get("/board/test/").text
@@ -84,6 +84,28 @@ def test_renamed_and_masked_names_are_gone_from_board_exports_feed_search_and_th
     assert "A complaint." in page
     team = get(keeper, f"/maintain/teams/{sent.method.team_id}/").one("main").text
     assert "teammate@example.org" in team
+
+
+def test_to_mask_a_name_is_a_choice_and_not_an_empty_field(
+    keeper: Client, edition: Edition, owner: User
+) -> None:
+    sent = published(edition, owner)
+    answer = keeper.post(
+        f"/maintain/actions/rename-method/{sent.method_id}/", {"reason": "A complaint.", "how": "rename"}
+    )
+    wrong = assert_sound(answer).one("div", id="id_name_error").text
+    assert wrong == "No new name was given; expected one, or to mask the present one."
+
+
+def test_what_cannot_be_undone_asks_maintainers_for_the_tick(
+    keeper: Client, edition: Edition, owner: User
+) -> None:
+    sent = published(edition, owner)
+    answer = keeper.post(f"/maintain/actions/hide/{sent.pk}/", {"reason": "A complaint."})
+    wrong = assert_sound(answer).one("div", id="id_confirm_error").text
+    assert wrong == "Confirm that this cannot be undone: tick the box."
+    sent.refresh_from_db()
+    assert sent.hidden_at is None
 
 
 def test_a_hidden_entry_leaves_boards_of_all_times_and_a_withdrawn_one_its_values(

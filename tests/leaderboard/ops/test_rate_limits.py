@@ -108,7 +108,7 @@ def test_after_five_wrong_passwords_the_right_one_is_refused_too(shared_cache: N
     signing_in(5)
     response = Client().post("/accounts/login/", {"login": "owner@example.org", "password": "correct horse"})
     assert response.status_code == 200
-    assert b"Too many failed login attempts" in response.content
+    assert b"Too many failed sign-ins. Try again in 5 minutes" in response.content
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from django.utils import timezone
 from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.models import AuditEvent, PageVersion, User
 from leaderboard.pages import texts
+from leaderboard.people import tokens
 from leaderboard.web.account import shown_once
 from tests import pages as html
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -37,6 +38,11 @@ def test_every_page_has_a_text_from_the_start_and_is_linked_from_every_page(
     for address in ("/", "/docs/", "/nowhere/", "/accounts/login/"):
         footer = html.page(client.get(address)).one("footer")
         assert f"/{name}/" in [a.attributes["href"] for a in footer.all("a")]
+
+
+def test_the_privacy_page_names_the_longest_life_of_a_token(client: Client, benchmark: None) -> None:
+    assert "at most one year" in html.get(client, "/privacy/").one("main").text
+    assert tokens.MAX_DAYS == 365
 
 
 def test_the_privacy_page_names_every_cookie_and_how_long_it_lives(client: Client, benchmark: None) -> None:

@@ -13,7 +13,7 @@ from tests import builders, pages
 from tests.leaderboard.web.test_every_page import assert_sound
 
 SENTENCE = (
-    "Only admitted teams can submit to test, and your team is not one of them; write to jury@example.org."
+    "Only admitted teams can submit to Test, and your team is not one of them; write to jury@example.org."
 )
 
 

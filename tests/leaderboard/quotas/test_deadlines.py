@@ -33,7 +33,7 @@ def set_times(kind: str) -> str:
     Split.objects.filter(pk="test").update(**times[kind])
     at = list(times[kind].values())[-1]
     verb = {LATE: "closed", FUTURE: "open", ENDING: "close"}[kind]
-    return f"Submissions to test {verb} at {at:%Y-%m-%d %H:%M} UTC."
+    return f"Submissions to Test {verb} at {at:%Y-%m-%d %H:%M} UTC."
 
 
 @pytest.mark.parametrize("kind", [LATE, FUTURE, ENDING])

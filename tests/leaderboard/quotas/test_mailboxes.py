@@ -63,7 +63,7 @@ def test_a_user_who_sends_deletes_and_signs_up_again_has_no_other_quota(limited:
     for email in ("x@example.org", "X@Example.org", "x+1@example.org"):
         forget(User.objects.get(is_active=True))
         again = account(email)
-        with pytest.raises(QuotaExceeded, match="Your team has used 3 submissions to test"):
+        with pytest.raises(QuotaExceeded, match="Your team has used 3 submissions to Test"):
             send(limited, again, 2.0)
     send(limited, account("y@example.org"), 3.0)
     # Who is forgotten twice is forgotten once.

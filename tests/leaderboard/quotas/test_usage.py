@@ -88,7 +88,7 @@ def test_one_more_than_the_limit_is_refused_until_the_oldest_leaves_the_window(
         send(owner, other(edition, 3), at=NOW + 3 * DAY)
     opens_at = NOW + 30 * DAY
     assert str(caught.value) == (
-        "Your team has used 3 submissions to test, its quota for 30 days; "
+        "Your team has used 3 submissions to Test, its quota for 30 days; "
         "the next slot opens at 2026-12-20 12:00 UTC."
     )
     assert (caught.value.quota.left, caught.value.quota.next_slot_at) == (0, opens_at)
@@ -206,7 +206,7 @@ def test_a_split_without_limits_takes_any_number(edition: Edition, owner: User) 
 
 def test_quotas_can_be_off_altogether(edition: Edition, owner: User, settings) -> None:
     limit(limit=0)
-    with pytest.raises(QuotaExceeded, match="may not submit to test") as caught:
+    with pytest.raises(QuotaExceeded, match="may not submit to Test") as caught:
         send(owner, other(edition, 1))
     assert caught.value.quota.retry_after_s(now=NOW) is None
     settings.QUOTAS = False

@@ -8,7 +8,7 @@ from django.http import HttpResponseBase
 from django.test import Client
 
 from leaderboard.models import Edition, User
-from tests import pages
+from tests import builders, pages
 
 PASSWORD = "kestrel-altimeter-9"
 
@@ -34,6 +34,18 @@ def test_sign_up_tells_of_all_that_is_wrong_at_once_and_of_each_rule_once(client
     assert root.one("div", id="id_password2_error").text == "You must type the same password each time."
     assert root.one("main").text.count("at least 8 characters") == 1
     assert root.one("input", class_="show-password").attributes["type"] == "checkbox"
+
+
+def test_account_begins_with_what_it_has_and_leads_to_each_part(signed_in: Client, owner: User) -> None:
+    builders.token(owner)
+    root = pages.get(signed_in, "/account/")
+    tiles = {
+        li.one("a").text: (li.one("strong").text, li.one("a").attributes["href"]) for li in root.all("li")
+    }
+    assert tiles["Email addresses"][0] == owner.email
+    assert tiles["API tokens"] == ("1", "/tokens/")
+    assert tiles["Two-factor authentication"][0] == "off"
+    assert all(signed_in.get(address).status_code == 200 for _, address in tiles.values())
 
 
 def test_forgotten_password_is_reset_by_a_link(client: Client, owner: User, benchmark: None) -> None:

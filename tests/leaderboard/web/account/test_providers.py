@@ -142,7 +142,7 @@ def test_a_verified_address_makes_an_account_that_signs_in_again(provider: Provi
     assert not SocialToken.objects.exists()
 
     again = Client()
-    assert arrive(again).headers["Location"] == "/submit/"
+    assert arrive(again).headers["Location"] == "/submissions/"
     assert is_in(again)
     # Without a password the account cannot be cut off from its only way in; with one it can.
     refused = again.post("/accounts/3rdparty/", {"account": account.pk})

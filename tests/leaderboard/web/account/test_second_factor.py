@@ -179,10 +179,14 @@ def test_codes_can_be_renewed_and_the_app_removed_after_the_password(
     client.post("/accounts/2fa/totp/deactivate/")
     subjects = [message.subject.partition("] ")[2] for message in mail.outbox]
     assert subjects == [
-        *("You have a second factor", "You have new recovery codes", "Your second factor was removed")
+        *(
+            "Two-factor authentication is on",
+            "You have new recovery codes",
+            "Two-factor authentication is off",
+        )
     ]
     assert not Authenticator.objects.exists()
-    assert sign_in(Client(), owner) == "/submit/"
+    assert sign_in(Client(), owner) == "/submissions/"
 
 
 # --- maintainers -----------------------------------------------------------------------------------------
@@ -312,10 +316,10 @@ def test_nobody_reads_or_writes_second_factors_in_the_administration(keeper: Use
         assert client.get(f"/admin/{model}/").status_code == 404
 
 
-def test_a_maintainer_who_signs_in_comes_to_what_waits_and_others_to_the_form(
+def test_a_maintainer_who_signs_in_comes_to_what_waits_and_others_to_their_submissions(
     keeper: User, owner: User, phone: Phone
 ) -> None:
-    assert (sign_in(Client(), keeper), sign_in(Client(), owner)) == ("/maintain/", "/submit/")
+    assert (sign_in(Client(), keeper), sign_in(Client(), owner)) == ("/maintain/", "/submissions/")
     form = {"login": keeper.email, "password": PASSWORD, "next": "/board/test/"}
     assert Client().post("/accounts/login/", form).headers["Location"] == "/board/test/"
     set_up(signed_in(keeper), phone)
@@ -335,7 +339,7 @@ def test_a_maintainer_resets_the_second_factor_of_another_with_a_reason(owner: U
     event = AuditEvent.objects.get(verb="second factor reset")
     assert (event.noun, event.noun_id, event.details) == ("User", str(owner.pk), {"reason": "lost the phone"})
     assert Mail.objects.get(user=owner).subject == "Your second factor was removed"
-    assert sign_in(Client(), owner) == "/submit/"
+    assert sign_in(Client(), owner) == "/submissions/"
 
 
 @pytest.mark.parametrize(

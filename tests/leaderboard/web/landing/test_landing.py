@@ -101,7 +101,7 @@ def test_dates_are_the_splits_and_for_the_signed_in_what_their_team_has_left(
     closes_at = timezone.now() + timedelta(days=3)
     Split.objects.filter(pk="test").update(closes_at=closes_at, quota_limit=2)
     builders.board_changed("test")
-    closing = f"Submissions to test close at {closes_at:%Y-%m-%d %H:%M} UTC."
+    closing = f"Submissions to Test close at {closes_at:%Y-%m-%d %H:%M} UTC."
     assert closing in panel(client, "boards").text
     client.force_login(owner)
     text = panel(client, "boards").text

@@ -1,6 +1,7 @@
 """The audit log as maintainers look through it and take it along."""
 
 import json
+from dataclasses import replace
 from datetime import UTC, timedelta
 from io import StringIO
 
@@ -10,8 +11,9 @@ from django.http import HttpResponseBase, StreamingHttpResponse
 from django.test import Client
 
 from leaderboard import audit
-from leaderboard.models import AuditEvent, User
-from tests import pages
+from leaderboard.editions import policy
+from leaderboard.models import AuditEvent, Edition, Split, User
+from tests import builders, pages
 from tests.leaderboard.web.test_every_page import assert_sound
 
 PAGE, JSON = "/maintain/audit/", "/maintain/audit/events.json"
@@ -111,8 +113,30 @@ def test_the_page_has_the_beginning_of_a_digest_and_the_export_has_all_of_it(
     digest = f"sha256:{'0123456789abcdef' * 4}"
     audit.record(verb="v", noun="n", noun_id="1", actor=owner, details={"report_digest": digest})
     [[*_, details, _]] = rows(keeper.get(PAGE))
-    assert details == "report_digest: sha256:01234567…"
+    assert details == "report digest: sha256:01234567…"
     assert digest in text_of(keeper.get(JSON))
+
+
+def test_events_have_names_and_links_and_the_words_of_people(
+    keeper: Client, edition: Edition, owner: User, maintainer: User
+) -> None:
+    method = builders.submit(owner, builders.predictions(edition), method="Owl net").method
+    policy.change(
+        split_name="test",
+        policy=replace(policy.policy_of(Split.objects.get(pk="test")), needs_admission=True),
+        actor=maintainer,
+    )
+    audit.record(verb="imported", noun="PublishedResult", noun_id="https://p", details={"added": ["r"] * 300})
+    page = keeper.get(PAGE)
+    by_verb = {row[3]: row for row in rows(page)}
+    assert by_verb["visibility changed"][4] == "Method Owl net"
+    assert by_verb["changed"][4:6] == ["Split Test", "needs admission: no → yes"]
+    [imported] = [row for row in rows(page) if row[4].startswith("Published result")]
+    assert imported[5] == "added: r, r, r, r, r and 295 more"
+    links = [a.attributes["href"] for a in pages.page(page).one("tbody").all("a")]
+    assert {f"/methods/{method.pk}/", "/maintain/splits/test/", f"/maintain/teams/{method.team_id}/"} <= {
+        *links
+    }
 
 
 # --- the role of a maintainer ----------------------------------------------------------------------------

@@ -269,7 +269,7 @@ def test_retrying_nothing_says_so_and_changes_nothing(
 
 def test_desk_says_what_the_queue_holds_and_leads_to_it(keeper: Client, all_three: object) -> None:
     root = get(keeper, "/maintain/")
-    assert "1 with system errors, 1 running, 1 waiting, the oldest for " in root.one("main").text
+    assert "3 1 system error, 1 running, 1 waiting, the oldest for " in root.one("main").text
     assert QUEUE in [a.attributes["href"] for a in root.one("main").all("a")]
 
 

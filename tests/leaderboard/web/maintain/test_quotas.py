@@ -14,7 +14,7 @@ from tests.leaderboard.web.test_every_page import assert_sound
 
 pytestmark = pytest.mark.slow
 
-QUOTAS = "/maintain/quotas/"
+QUOTAS, TEAMS = "/maintain/quotas/", "/maintain/teams/"
 RULES_OF_TEST = (
     "3 submissions within 30 days, at least 24 hours apart; 20 rejected or cancelled files within 24 hours"
 )
@@ -119,14 +119,23 @@ def test_team_is_listed_by_name_by_look_and_by_its_people(
     keeper: Client, team: Team, teammate: User, stranger: User, text: str
 ) -> None:
     teams.team_of(user=stranger)
-    root = pages.page(keeper.get(QUOTAS, {"team": text}))
-    assert cells(root, "Teams") == [["Owls", "owner@example.org teammate@example.org", "Moderate"]]
+    root = pages.page(keeper.get(TEAMS, {"team": text}))
+    people = "owner@example.org teammate@example.org"
+    assert cells(root, "Teams") == [["Owls", people, "0", "0", "–", "Quotas"]]
     assert address(team) in [a.attributes["href"] for a in root.all("a")]
+
+
+def test_hub_leads_to_a_list_of_all_teams(keeper: Client, team: Team, stranger: User) -> None:
+    other = teams.team_of(user=stranger)
+    (tile,) = [li for li in get(keeper, "/maintain/").all("li") if li.text.startswith("Teams")]
+    assert tile.one("strong").text == "2"
+    listed = cells(get(keeper, tile.one("a").attributes["href"]), "Teams")
+    assert sorted(row[0] for row in listed) == sorted(["Owls", other.name])
 
 
 @pytest.mark.parametrize("text", ["x" * 255, "\0"])
 def test_what_cannot_be_looked_up_has_a_reason_at_its_field(keeper: Client, team: Team, text: str) -> None:
-    answer = keeper.get(QUOTAS, {"team": text})
+    answer = keeper.get(TEAMS, {"team": text})
     assert answer.status_code == 400
     assert assert_sound(answer).one("div", class_="wrong").one("div", class_="errors").text
 
@@ -222,6 +231,3 @@ def test_override_ends_with_a_reason_and_on_the_record(
     assert (event.actor, event.noun_id) == (maintainer, str(team.pk))
     assert event.details == {"split": "test", "reason": "The deadline is over."}
     assert keeper.post(end, {"reason": "Again."}).status_code == 404
-
-
-# --- the hub, the price ----------------------------------------------------------------------------------

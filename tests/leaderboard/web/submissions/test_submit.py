@@ -13,6 +13,7 @@ from pytest_django import Settings
 import evaluator
 from leaderboard.models import Edition, Split, Submission, User
 from leaderboard.storage import manifests
+from leaderboard.web.decorators import SESSION_ENDED
 from tests import builders, pages
 
 FIELDS = {"split": "test", "method": "Foo", "description": "", "paper_url": "", "code_url": ""}
@@ -36,6 +37,16 @@ def test_signed_out_visitor_is_led_to_sign_in_and_back(client: Client, edition: 
     login = pages.page(client.get(response.headers["Location"]))
     (sign_up,) = [a for a in login.one("main").all("a") if a.text == "Sign up"]
     assert sign_up.attributes["href"] == "/accounts/signup/?next=%2Fsubmit%2F%3Fsplit%3Dtest"
+
+
+def test_form_sent_after_the_session_ended_says_so_on_the_sign_in_page(
+    client: Client, edition: Edition
+) -> None:
+    response = send(client, builders.predictions(edition))
+    assert response.status_code == 302
+    root = pages.page(client.get(response.headers["Location"]))
+    assert root.one("div", class_="messages").text == SESSION_ENDED
+    assert not Submission.objects.exists()
 
 
 def test_good_file_leads_to_its_own_page(signed_in: Client, edition: Edition, owner: User) -> None:
@@ -105,7 +116,9 @@ def test_the_only_open_split_is_chosen_and_of_closed_ones_stands_the_reason_with
     [choice] = root.all("input", type="radio")
     assert (choice.attributes["value"], "checked" in choice.attributes) == ("test", True)
     closed = root.one("ul", class_="closed-splits")
-    assert closed.text.startswith("val: Submissions to val are not open yet")
+    assert closed.text.startswith(
+        "Submissions to Validation open once the organisers provide the ground truth."
+    )
     assert [a.attributes["href"] for a in closed.all("a")] == ["/board/val/", "/board/demo/"]
 
 
@@ -167,7 +180,7 @@ def test_an_exhausted_quota_stands_at_the_split_before_and_after_the_file_is_sen
     builders.submit(owner, builders.predictions(edition))
     assert "the next slot opens at" in pages.page(signed_in.get("/submit/")).one("main").text
     response = send(signed_in, builders.predictions(edition, factor=1.2))
-    assert error_at(response, "split").startswith("Your team has used 1 submission to test")
+    assert error_at(response, "split").startswith("Your team has used 1 submission to Test")
     assert Submission.objects.count() == 1
 
 
@@ -201,4 +214,4 @@ def test_announced_excess_is_answered_413_without_reading(
     settings.MAX_PREDICTIONS_BYTES = 1000
     response = send(signed_in, b"x" * 200_000)
     assert response.status_code == 413
-    assert "expected at most 1,000" in pages.page(response).one("main").text
+    assert "expected at most 1 kB" in pages.page(response).one("main").text

@@ -17,6 +17,9 @@ from tests.leaderboard.web.test_every_page import assert_sound
 pytestmark = pytest.mark.slow
 
 
+CONFIRMED = {"confirm": "on"}
+
+
 def address(submission: Submission, part: str = "") -> str:
     return f"/submissions/{submission.pk}/{part}"
 
@@ -104,17 +107,28 @@ def test_page_says_what_withdrawing_does_and_that_it_stays_done(signed_in: Clien
     (link,) = [a for a in pages.page(signed_in.get(address(sent))).all("a") if a.text.startswith("Withdraw")]
     root = assert_sound(signed_in.get(link.attributes["href"]))
     assert "This cannot be undone." in root.one("main").text
-    assert "Its values leave the board and every former edition." in root.one("main").text
+    assert "removed from the current board and from all earlier editions" in root.one("main").text
     assert root.one("main").one("button").text == "Withdraw"
+    sent.refresh_from_db()
+    assert sent.withdrawn_at is None
+
+
+def test_withdrawing_asks_for_the_tick_that_publishing_asks_for(signed_in: Client, sent: Submission) -> None:
+    response = signed_in.post(address(sent, "withdraw/"))
+    assert response.status_code == 422
+    wrong = pages.page(response).one("div", id="id_confirm_error").text
+    assert wrong == "Confirm that this cannot be undone: tick the box."
     sent.refresh_from_db()
     assert sent.withdrawn_at is None
 
 
 def test_team_withdraws_and_sees_when(client: Client, sent: Submission, teammate: User) -> None:
     client.force_login(teammate)
-    response = client.post(address(sent, "withdraw/"), follow=True)
+    response = client.post(address(sent, "withdraw/"), CONFIRMED, follow=True)
     assert response.redirect_chain == [(address(sent), 302)]
     assert "The submission is withdrawn." in pages.page(response).one("div", class_="messages").text
+    line = pages.get(client, address(sent)).one("ol", class_="steps").all("li")
+    assert line[-1].text.startswith("Withdrawn")
     sent.refresh_from_db()
     assert notices(client, sent)[0].startswith(f"Withdrawn by its team on {sent.withdrawn_at:%Y-%m-%d}")
     assert AuditEvent.objects.get(verb="withdrawn").actor == teammate
@@ -127,19 +141,19 @@ def test_what_waits_or_failed_is_cancelled_in_words_of_its_own(
     queue_rows.strike_out()
     waiting = builders.submit(owner, builders.predictions(edition), method="Waiting")
     for submission, words, verb in (
-        (failed, "it failed by an error on our side and has no values", "withdrawn"),
+        (failed, "it failed by an error on our side and has no scores", "withdrawn"),
         (waiting, "It is cancelled and not scored", "cancelled"),
     ):
         main = assert_sound(signed_in.get(address(submission, "withdraw/"))).one("main")
         assert words in main.text
-        assert "Its values leave the board" not in main.text
-        done = signed_in.post(address(submission, "withdraw/"), follow=True)
+        assert "removed from the current board" not in main.text
+        done = signed_in.post(address(submission, "withdraw/"), CONFIRMED, follow=True)
         assert f"The submission is {verb}." in pages.page(done).one("div", class_="messages").text
 
 
 def test_withdrawing_twice_is_withdrawing_once(signed_in: Client, sent: Submission) -> None:
     for _ in range(2):
-        assert signed_in.post(address(sent, "withdraw/")).status_code == 302
+        assert signed_in.post(address(sent, "withdraw/"), CONFIRMED).status_code == 302
     assert AuditEvent.objects.filter(verb="withdrawn").count() == 1
     assert signed_in.get(address(sent, "withdraw/")).headers["Location"] == address(sent)
     links = [a.text for a in pages.page(signed_in.get(address(sent))).all("a")]

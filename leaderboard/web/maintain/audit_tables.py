@@ -1,0 +1,165 @@
+"""The rows of the audit log with names and links in place of ids."""
+
+import re
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Final, NamedTuple
+
+from django.core.exceptions import ValidationError
+from django.db.models import Model
+from django.urls import reverse
+
+from leaderboard import audit
+from leaderboard.models import AuditEvent, Edition, Evaluation, Method, Split, Submission, Team, User
+from leaderboard.pages.texts import PAGES
+
+MAX_LISTED: Final = 5
+_DIGEST: Final = re.compile(r"(sha256:[0-9a-f]{8})[0-9a-f]{56}")
+_MOMENT: Final = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d):\d\d(?:\.\d+)?\+00:00")
+# In `before → after`, as a change of a split is kept.
+_PYTHON: Final = re.compile(r"(?<=→ )(?:None|True|False)$|^(?:None|True|False)(?= →)")
+_SAID: Final = {"None": "none", "True": "yes", "False": "no"}
+_VERBS: Final = {
+    "shown": "visibility changed",
+    "revealed": "made public on its day",
+    "appointed_owner": "owner appointed",
+    "removed_member": "member removed",
+    "revoked_invitation": "invitation revoked",
+    "cleared": "texts deleted",
+}
+_NOUNS: Final = {
+    "ApiToken": "API token",
+    "GroundTruth": "Ground truth",
+    "PublishedResult": "Published result",
+    "SiteAnnouncement": "Announcement of the site",
+    "User": "Person",
+}
+
+
+def verb_words(verb: str) -> str:
+    """Word an action.
+
+    >>> verb_words("shown"), verb_words("quota_overridden")
+    ('visibility changed', 'quota overridden')
+    """
+    return _VERBS.get(verb, verb.replace("_", " "))
+
+
+def noun_words(noun: str) -> str:
+    return _NOUNS.get(noun, noun)
+
+
+class Subject(NamedTuple):
+    """The name of what an event is about, and its page if it has one."""
+
+    name: str
+    href: str = ""
+
+
+class AuditRow(NamedTuple):
+    event: AuditEvent
+    verb: str
+    noun: str
+    subject: Subject
+    details: list[tuple[str, str]]
+
+
+def audit_rows(events: Iterable[AuditEvent]) -> list[AuditRow]:
+    events = list(events)
+    names = audit.names_in(events)
+    subjects = _subjects(events)
+    return [
+        AuditRow(
+            event,
+            verb_words(event.verb),
+            noun_words(event.noun),
+            subjects.get((event.noun, event.noun_id), Subject(_words(event.noun_id))),
+            _details(event, names, subjects),
+        )
+        for event in events
+    ]
+
+
+def named(event: AuditEvent, names: Mapping[str, str]) -> dict[str, str]:
+    """Return the details that stand for a name, as that name."""
+    texts = {name: value for name, value in event.details.items() if isinstance(value, str)}
+    return {name: names[value] for name, value in texts.items() if value in names}
+
+
+def _details(
+    event: AuditEvent, names: Mapping[str, str], subjects: Mapping[tuple[str, str], Subject]
+) -> list[tuple[str, str]]:
+    texts = {name: _words(value) for name, value in event.details.items()}
+    texts |= {
+        name: subjects[noun, text].name
+        for name, text in texts.items()
+        for noun in ("Team", "User")
+        if name in {"user", "team", "from", "to"} and (noun, text) in subjects
+    }
+    texts |= {name: text or "(blanked)" for name, text in named(event, names).items()}
+    return [(name.removeprefix("is_").replace("_", " "), text) for name, text in texts.items() if text]
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        n_more = len(value) - MAX_LISTED
+        more = f" and {n_more:,} more" if n_more > 0 else ""
+        return ", ".join(str(each).replace("_", " ") for each in value[:MAX_LISTED]) + more
+    text = "" if value is None else _PYTHON.sub(lambda match: _SAID[match[0]], str(value))
+    if text.isupper():  # a choice, as PRIVATE
+        return text.lower()
+    return _MOMENT.sub(r"\1 \2 UTC", _DIGEST.sub(r"\1…", text))
+
+
+# --- from ids to names, with one question for each table -------------------------------------------------
+
+
+def _subjects(events: Iterable[AuditEvent]) -> dict[tuple[str, str], Subject]:
+    ids: dict[str, set[str]] = defaultdict(set)
+    for event in events:
+        ids[event.noun].add(event.noun_id)
+        # Details name people and teams by their id as well.
+        for name in ("user", "team", "from", "to"):
+            if name in event.details:
+                ids["User" if name == "user" else "Team"].add(str(event.details[name]))
+    found: dict[tuple[str, str], Subject] = {}
+    for noun, (model, related, subject_of) in _TABLES.items():
+        keys = [key for key in ids[noun] if _is_key(model, key)]
+        if keys:
+            rows = model._default_manager.filter(pk__in=keys).select_related(*related)
+            found |= {(noun, str(row.pk)): subject_of(row) for row in rows}
+    pages = ids["Page"] & set(PAGES)
+    return found | {
+        ("Page", name): Subject(PAGES[name].title, reverse("maintain_page", args=[name])) for name in pages
+    }
+
+
+def _is_key(model: type[Model], text: str) -> bool:
+    try:
+        model._meta.pk.to_python(text)
+    except ValidationError:
+        return False
+    return True
+
+
+def _submission(row: Submission) -> Subject:
+    return Subject(f"{row.method.name} on {row.split_id}", reverse("submission", args=[row.pk]))
+
+
+_TABLES: Final[Mapping[str, tuple[Any, tuple[str, ...], Callable[[Any], Subject]]]] = {
+    "Edition": (
+        Edition,
+        (),
+        lambda row: Subject(
+            f"{row.number} of {row.split_id}", reverse("maintain_edition", args=[row.split_id, row.number])
+        ),
+    ),
+    "Evaluation": (Evaluation, ("submission__method",), lambda row: _submission(row.submission)),
+    "Method": (Method, (), lambda row: Subject(row.name, reverse("method", args=[row.pk]))),
+    "Split": (Split, (), lambda row: Subject(row.title, reverse("maintain_split", args=[row.pk]))),
+    "Submission": (Submission, ("method",), _submission),
+    "Team": (Team, (), lambda row: Subject(row.name, reverse("maintain_team", args=[row.pk]))),
+    "User": (User, (), lambda row: Subject(row.email)),
+}
