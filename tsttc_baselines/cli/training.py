@@ -15,12 +15,12 @@ from evaluator.cli.options import default_option, json_option
 from evaluator.cli.reading import FOLDER, naming
 from evaluator.counting import counted
 from tsttc_baselines.cli import require_opencv
-from tsttc_baselines.cli.options import TRUTH, out_option, require_writable
+from tsttc_baselines.cli.options import out_option, require_writable
 
 if TYPE_CHECKING:
-    from tsttc_baselines.deep_scale.samples import Source
     from tsttc_baselines.deep_scale.training import Epoch
     from tsttc_baselines.deep_scale.weights import Use, Weights
+    from tsttc_baselines.pairs import Source
 
 # Not that of the sequences on which documents compare the methods (7).
 _VALIDATION_SEED = 13
@@ -195,7 +195,7 @@ def _contradiction(name: str, value: Any, use: Use) -> str:
 def _rendered(n_sequences: int, *, seed: int) -> Source:
     import numpy as np  # noqa: PLC0415 -- --help can do without
 
-    from tsttc_baselines.deep_scale.samples import RenderedSequences  # noqa: PLC0415 -- as above
+    from tsttc_baselines.pairs import RenderedSequences  # noqa: PLC0415 -- as above
     from tsttc_baselines.simulation import split  # noqa: PLC0415 -- as above
 
     drawn = split(
@@ -205,13 +205,10 @@ def _rendered(n_sequences: int, *, seed: int) -> Source:
 
 
 def _folder_source(path: Path) -> Source:
-    from evaluator import read_truth  # noqa: PLC0415 -- as above
-    from tsttc_baselines.deep_scale.samples import FolderSequences  # noqa: PLC0415 -- --help can do without
-    from tsttc_baselines.folders import read_folder  # noqa: PLC0415 -- as above
+    from tsttc_baselines.pairs import FolderSequences  # noqa: PLC0415 -- --help can do without
 
-    has_table = (path / TRUTH).is_file()
     with naming(path):
-        return FolderSequences.of(read_folder(path), read_truth(path / TRUTH if has_table else path))
+        return FolderSequences.read(path)
 
 
 def _tell(epoch: Epoch) -> None:

@@ -30,11 +30,12 @@ from tsttc_baselines.deep_scale.estimator import N_TOP, cut, network_logits, net
 from tsttc_baselines.deep_scale.fit import equations, evened, fitted_scale_ratio, solution, weighting
 from tsttc_baselines.deep_scale.fit_samples import FitSample
 from tsttc_baselines.deep_scale.network import features
-from tsttc_baselines.deep_scale.samples import Sample, Source, batches, usable_pair
+from tsttc_baselines.deep_scale.samples import Sample, batches
 from tsttc_baselines.deep_scale.torch_layers import TorchLayers
 from tsttc_baselines.deep_scale.weights import SHAPES, Use, Weights, write_weights
 from tsttc_baselines.detection import scale_ratio_of_two
 from tsttc_baselines.estimates import Unusable
+from tsttc_baselines.pairs import Source, usable_pair
 
 Floats = NDArray[np.float64]
 Optimizer = Literal["sgd", "adam"]

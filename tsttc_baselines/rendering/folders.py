@@ -13,13 +13,11 @@ import numpy as np
 from evaluator.truth.annotations import FRAME_STEP_NS
 from evaluator.truth.csv_tables import COLUMNS, MANIFEST_COLUMNS
 from tsttc_baselines.clips import N_FRAMES
-from tsttc_baselines.folders import BOXES, IMAGES, MANIFEST
+from tsttc_baselines.folders import BOXES, IMAGES, MANIFEST, TRUTH
 from tsttc_baselines.highway import Floats
 from tsttc_baselines.processes import worked_through
 from tsttc_baselines.rendering.clips import render
 from tsttc_baselines.simulation import Split
-
-TRUTH = "truth.csv"
 
 Progress = Callable[[int], None]
 

@@ -12,19 +12,14 @@ from numpy.typing import NDArray
 from evaluator import GroundTruth, read_truth
 from tests.tsttc_baselines.made_folders import made_folder, stamp
 from tsttc_baselines.clips import Clip
-from tsttc_baselines.deep_scale.samples import (
-    FolderSequences,
-    RenderedSequences,
-    Sample,
-    batches,
-    usable_pair,
-)
+from tsttc_baselines.deep_scale.samples import Sample, batches
 from tsttc_baselines.deep_scale.weights import Decoding, Use, Weights, read_weights
 from tsttc_baselines.folders import read_folder
 from tsttc_baselines.methods import OWN_WEIGHTS
+from tsttc_baselines.pairs import FolderSequences, RenderedSequences, usable_pair
 from tsttc_baselines.simulation import split
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.torch]
 
 SMALL = Use(similarity="cosine", n_cells=10, max_box_px=16.0, margin_px=4.0)
 
@@ -32,7 +27,8 @@ SMALL = Use(similarity="cosine", n_cells=10, max_box_px=16.0, margin_px=4.0)
 @pytest.fixture(scope="module")
 def training() -> Any:
     """The module that trains, which needs torch."""
-    torch = pytest.importorskip("torch", reason="torch is not installed: pip install '.[train]'")
+    import torch  # noqa: PLC0415 -- where there is none, `tests/conftest.py` leaves this out
+
     torch.set_num_threads(1)
     from tsttc_baselines.deep_scale import training  # noqa: PLC0415 -- it imports torch
 
