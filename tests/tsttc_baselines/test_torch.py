@@ -74,7 +74,7 @@ def test_augmented_pairs_have_the_scale_ratio_that_they_show() -> None:
     seen = [float(item["box_ratio"] * (side(item["crops"][0]) / side(item["crops"][1]))) for item in items]
     ratios = [float(item["scale_ratio"]) for item in items]
     np.testing.assert_allclose(seen, ratios, rtol=0.05)
-    assert min(ratios) < 0.75
+    assert min(ratios) < 0.77
     assert max(ratios) > 1.2, "some are swapped, some resized"
     assert len({float(item["box_ratio"]) for item in items}) > 50, "boxes move"
     torch.manual_seed(1)

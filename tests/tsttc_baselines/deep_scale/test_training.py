@@ -73,8 +73,9 @@ class Ended(Exception):
     """Ends a training, as Ctrl-C does."""
 
 
-def end(_epoch: object) -> None:
-    raise Ended
+def end(epochs: tuple[object, ...]) -> None:
+    if epochs:
+        raise Ended
 
 
 def test_an_ended_training_goes_on_as_if_nothing_had_been(
@@ -138,10 +139,11 @@ def test_with_a_start_the_score_before_epoch_1_comes_first_and_no_rate_keeps_it(
     known = {"source": rows, "validation": training.Validation(rows), "recipe": recipe, "start": start}
     reported: list[Any] = []
     epochs = training.train(**known, out=tmp_path / "w.npz", after_epoch=reported.append)
-    assert reported == epochs
+    assert reported == [tuple(epochs[:1]), tuple(epochs)]
     assert [epoch.number for epoch in epochs] == [0, 1]
     before, after = epochs
-    assert (before.loss, before.n_left_out) == (None, 0)
+    assert (before.loss, before.n_left_out, before.learning_rate) == (None, 0, None)
+    assert 0 < after.learning_rate <= 2e-12
     scored = training.Validation(rows).scores(
         training.Network(as_torch(training, start), recipe=recipe, device="cpu").operations(), use=start.use
     )
