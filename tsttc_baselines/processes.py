@@ -68,7 +68,11 @@ def worked_through(
 
 
 def _pieces(rows: Sequence[int], *, n_processes: int, most: int) -> list[Sequence[int]]:
-    """The rows in pieces of 1, 2, 4, … and then `most`, so that the first results come soon."""
+    """The rows in pieces of 1, 2, 4, … and then `most`, so that the first results come soon.
+
+    >>> [len(piece) for piece in _pieces(range(30), n_processes=2, most=8)]
+    [1, 1, 2, 2, 4, 4, 8, 8]
+    """
     pieces: list[Sequence[int]] = []
     start = 0
     while start < len(rows):
