@@ -15,6 +15,8 @@ PY := $(VENV)/bin/python
 checksum = $(firstword $(shell cat $(1) pyproject.toml | cksum))
 SERVER_STAMP := $(VENV)/.installed-server-$(call checksum,requirements.lock)
 DEV_STAMP := $(VENV)/.installed-dev-$(call checksum,requirements-dev.lock)
+TORCH_VENV := $(VENV)-torch
+TORCH_STAMP := $(TORCH_VENV)/.installed-$(firstword $(shell cat requirements-torch.txt requirements-dev.lock | cksum))
 # The development environment has everything that the server needs, in the same versions.
 READY := $(or $(wildcard $(DEV_STAMP)),$(SERVER_STAMP))
 
@@ -23,7 +25,7 @@ SPREAD := -n auto --dist loadfile --no-loadscope-reorder
 # So numpy has no threads of its own, which would only wait for each other. It reads this when it is imported.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo demo-runs test test-fast chaos bench lint format screenshots release lock echarts clean
+.PHONY: help demo demo-runs test test-fast test-torch chaos bench lint format screenshots release lock echarts clean
 
 help: ## list what can be made
 	@awk -F ' ## ' '/^[a-z-]+:.* ## / { sub(/:.*/, "", $$1); printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -39,6 +41,10 @@ test: lint ## lint, then the whole test suite; parts that lack a service say so
 
 test-fast: $(DEV_STAMP) ## what takes about a minute: no services, no browser, nothing slow
 	$(PY) -m pytest -q $(SPREAD) -m "not slow and not services and not browser"
+
+test-torch: $(DEV_STAMP) $(TORCH_STAMP) ## the tests that need torch, in an environment of their own (.venv-torch)
+	@$(TORCH_VENV)/bin/python -c 'import lightning, torch, torchmetrics; print("torch", torch.__version__)'
+	$(TORCH_VENV)/bin/python -m pytest -q $(SPREAD) -m torch tests/evaluator tests/tsttc_baselines
 
 chaos: $(DEV_STAMP) ## 200 uploads while everything that can fail does; says what was lost, doubled or stuck
 	@$(PY) -m tests.chaos
@@ -90,7 +96,7 @@ echarts: ## build static/vendored/echarts.min.js anew (ECHARTS=… for another v
 	cd "$(CURDIR)" && sha256sum static/vendored/echarts.*
 
 clean: ## remove the environment and everything generated, but not var/ (the demo's data)
-	rm -rf $(VENV) $(VENV)-lock staticfiles build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-lock $(TORCH_VENV) staticfiles build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 
 # --- the environment -------------------------------------------------------------------------------------
 
@@ -123,3 +129,12 @@ $(SERVER_STAMP):
 
 $(DEV_STAMP):
 	$(call install,requirements-dev.lock,dev)
+
+# What torch needs lies on top of the development environment, which stays without it.
+$(TORCH_STAMP): $(DEV_STAMP)
+	@echo "Installing requirements-torch.txt"
+	@$(PY) -m venv --clear $(TORCH_VENV)
+	@$(PY) -c 'import sysconfig; print("import site; site.addsitedir(" + repr(sysconfig.get_path("purelib")) + ")")' \
+		> $$($(TORCH_VENV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/development.pth
+	@$(TORCH_VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-torch.txt
+	@touch $@

@@ -4,6 +4,7 @@ import gc
 import itertools
 import os
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import hypothesis
@@ -34,6 +35,8 @@ os.environ.setdefault("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
 
 _NUMBERS = itertools.count()
 
+NEED_TORCH = {"test_torch.py", "test_lightning.py"}
+
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
     """Bytes are named by their argument: all processes agree on it, and a gzip header holds the time."""
@@ -45,8 +48,16 @@ def pytest_configure() -> None:
     prepared.begin()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """See `tests/spread.py`."""
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    """Without torch, files whose imports need it are left alone: `make test-torch` runs them."""
+    return True if collection_path.name in NEED_TORCH and find_spec("torch") is None else None
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Without torch, tests that are marked so are left out. See also `tests/spread.py`."""
+    if find_spec("torch") is None:
+        config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("torch")])
+        items[:] = [item for item in items if not item.get_closest_marker("torch")]
     spread.sort(items)
 
 

@@ -26,7 +26,11 @@ class Estimate:
 
 
 class Estimator(Protocol):
-    """A baseline with its parameters."""
+    """A baseline with its parameters.
+
+    What it really takes in place of a parameter, as where that is "auto", it may say in `used`, a dict of
+    parameters: the prediction file then has these.
+    """
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
         """Estimate α between frame `5 - frame_gap` (1…5) and frame 5; raises `Unusable`."""

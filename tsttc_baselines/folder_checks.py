@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from evaluator.counting import counted
 from evaluator.problems import Findings, reject
 from tsttc_baselines.clips import TARGET
 from tsttc_baselines.estimates import SequenceFault
@@ -28,6 +30,7 @@ def require_usable(folder: SequenceFolder, *, method: Method, frame_gap: int) ->
         names = " and ".join(map(str, frames))
         message = f"No sequence has boxes for the frames {names}; expected them for a gap of {frame_gap}."
         raise reject("bad-box", message, folder.boxes_from)
+    _require_order(folder.boxes[usable][:, list(frames)], where=folder.boxes_from)
     if method.frames == "none":
         return
     if not any(folder.frame_path(row, TARGET).exists() for row in range(folder.n_sequences)):
@@ -38,6 +41,18 @@ def require_usable(folder: SequenceFolder, *, method: Method, frame_gap: int) ->
         raise reject("bad-frame", message, where)
     if not folder.is_normalised:
         _require_pixels(folder)
+
+
+def _require_order(boxes: NDArray[np.float64], *, where: str) -> None:
+    """Raise `Rejected` where most boxes (n, frames, 4) end before they begin: two columns are swapped."""
+    for low, name in ((0, "x"), (1, "y")):
+        n_reversed = np.count_nonzero((boxes[..., low + 2] < boxes[..., low]).any(axis=1))
+        if 2 * n_reversed > len(boxes):
+            message = (
+                f"{name}1 and {name}2 are swapped: {n_reversed:,} of {counted(len(boxes), 'sequence')} have "
+                f"a box with {name}2 < {name}1; expected {name}1 < {name}2."
+            )
+            raise reject("bad-box", message, where)
 
 
 def require_complete(folder: SequenceFolder, *, method: Method, frame_gap: int) -> None:

@@ -10,6 +10,7 @@ A sequence's target is frame 5 at its own ts; frame 5 − k has the timestamp ts
 from __future__ import annotations
 
 import hashlib
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from evaluator.problems import Problem, Rejected, reject
 from evaluator.truth.annotation_folders import list_files, read_annotations
 from evaluator.truth.annotations import FRAME_STEP_NS
-from evaluator.truth.ground_truth import Manifest, read_manifest
+from evaluator.truth.ground_truth import GroundTruth, Manifest, read_manifest, read_truth
 from evaluator.truth.numbering import require_the_same
 from tsttc_baselines.box_tables import read_boxes
 from tsttc_baselines.clips import TARGET, Clip, Image
@@ -34,6 +35,8 @@ NOMINAL_SIZE: Final = (1024, 576)
 MANIFEST: Final = "manifest.csv"
 BOXES: Final = "boxes.csv"
 IMAGES: Final = "images"
+TRUTH: Final = "truth.csv"
+"""The ground truth of a folder, as `tsttc baseline render` writes it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,12 +156,13 @@ class SequenceFolder:
         return "image is missing", f"The image is missing; expected {sequence}, as .jpg or .png."
 
 
-def read_folder(path: Path) -> SequenceFolder:
+def read_folder(path: str | os.PathLike[str]) -> SequenceFolder:
     """Read a folder of this convention, or the downloaded dataset.
 
     Raises `Rejected` for other folders and for faulty tables or annotation files; boxes and images are
     checked later.
     """
+    path = Path(path)
     root = path / IMAGES if (path / IMAGES).is_dir() else path
     if (path / BOXES).is_file():
         if not (path / MANIFEST).is_file():
@@ -185,6 +189,16 @@ def read_folder(path: Path) -> SequenceFolder:
         is_normalised=True,
         has_own_numbers=given is None,
     )
+
+
+def read_folder_truth(path: Path) -> GroundTruth:
+    """Read the ground truth of a folder, a table or annotation files; raises `Rejected` for neither."""
+    if (path / TRUTH).is_file():
+        return read_truth(path / TRUTH)
+    if not list_files(path):
+        message = f"The folder has neither {TRUTH} nor annotation files (*.pkl); expected its ground truth."
+        raise reject("unreadable", message, path.name)
+    return read_truth(path)
 
 
 def _manifest(path: Path) -> Manifest:

@@ -33,6 +33,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     low: float | None = None
     high: float | None = None
+    is_required: bool = False
 
     @property
     def default_in_words(self) -> str | None:
@@ -64,7 +65,7 @@ class Method:
     boxes: Literal["pair", "target"] = "pair"
 
     def filled(self, given: Mapping[str, Value]) -> dict[str, Value]:
-        """Fill in defaults, in order; raises `KeyError` for unknown names, `ValueError` if not finite."""
+        """Fill in defaults; raises `KeyError` for unknown names, `ValueError` for missing or infinite ones."""
         known = {parameter.name: parameter.default for parameter in self.parameters}
         strangers = [name for name in given if name not in known]
         if strangers:
@@ -73,13 +74,20 @@ class Method:
             value = given.get(parameter.name)
             if isinstance(value, float) and not math.isfinite(value):
                 raise ValueError(f"{parameter.option} is {value}; expected a finite number.")
+            if parameter.is_required and value is None:
+                raise ValueError(f"{self.name} needs {parameter.name}; give it with --set {parameter.name}=…")
         return known | dict(given)
 
-    def provenance(self, parameters: Mapping[str, Value]) -> str:
-        """Compare these parameters with the published row: as published, variant or unpublished."""
+    def provenance(self, parameters: Mapping[str, Value], *, digests: Mapping[str, str] | None = None) -> str:
+        """Compare these parameters with the published row: as published, variant or unpublished.
+
+        `digests` are the SHA-256 of files among the parameters, by which a published file is known.
+        """
         if self.published is None:
             return "unpublished"
-        is_published = all(parameters[name] == value for name, value in self.published.items())
+        files = {name: PUBLISHED_FILES.get(digest) for name, digest in (digests or {}).items()}
+        given = {**parameters, **files}
+        is_published = all(given[name] == value for name, value in self.published.items())
         return "as published" if is_published else "variant"
 
     def estimator(self, parameters: Mapping[str, Value]) -> Estimator:
@@ -90,6 +98,11 @@ class Method:
 
 MEASURES: Final = ("area", "sqrt-area", "height", "width")
 """As in `tsttc_baselines.boxes`, which loads numpy."""
+
+PUBLISHED_FILES: Final = {
+    "aa6d986655ec395039fb16ec95a6b210330f9dedda28ad8ae9efe9c9e3375624": "Deep_TTC.pth",
+}
+"""Weights of published rows, by their SHA-256: the toolkit's checkpoint."""
 
 OWN_WEIGHTS: Final = Path(__file__).parent / "deep_scale" / "rendered.npz"
 """The weights that come with the package, trained on rendered frames."""
@@ -143,7 +156,8 @@ METHODS: Final[tuple[Method, ...]] = (
     Method(
         name="tracking",
         title="SOT",
-        summary="The target box is followed back to the reference frame. The paper follows with OSTrack.",
+        summary="The target box is followed back to the reference frame. The paper follows with OSTrack, "
+        "which is not here.",
         factory="tsttc_baselines.tracking:Tracking",
         parameters=(
             # No choices: a tracker that cannot be used is refused with the reason.
@@ -154,6 +168,7 @@ METHODS: Final[tuple[Method, ...]] = (
             Parameter("backbone", None, "NanoTrack's backbone (ONNX).", kind=Path),
             Parameter("head", None, "NanoTrack's head (ONNX).", kind=Path),
         ),
+        published={"tracker": "ostrack", "measure": "area"},
         frames="all",
         boxes="target",
     ),
@@ -180,6 +195,7 @@ METHODS: Final[tuple[Method, ...]] = (
                 choices=("auto", "head", "fit"),
             ),
         ),
+        published={"weights": "Deep_TTC.pth", "decoding": "head"},
     ),
     Method(
         name="alignment",

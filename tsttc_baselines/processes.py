@@ -51,7 +51,7 @@ def worked_through(
             yield [worker(row)]
         return
     n_rows = max(1, min(MAX_ROWS, len(rows) // (_N_PIECES * n_processes)))
-    pieces = [rows[start : start + n_rows] for start in range(0, len(rows), n_rows)]
+    pieces = _pieces(rows, n_processes=n_processes, most=n_rows)
     context = multiprocessing.get_context("spawn")
     theirs, ours = context.Pipe(duplex=False)
     pool = ProcessPoolExecutor(n_processes, mp_context=context, initializer=_start, initargs=(make, theirs))
@@ -65,6 +65,21 @@ def worked_through(
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _pieces(rows: Sequence[int], *, n_processes: int, most: int) -> list[Sequence[int]]:
+    """The rows in pieces of 1, 2, 4, … and then `most`, so that the first results come soon.
+
+    >>> [len(piece) for piece in _pieces(range(30), n_processes=2, most=8)]
+    [1, 1, 2, 2, 4, 4, 8, 8]
+    """
+    pieces: list[Sequence[int]] = []
+    start = 0
+    while start < len(rows):
+        n_rows = min(most, 2 ** (len(pieces) // n_processes))
+        pieces.append(rows[start : start + n_rows])
+        start += n_rows
+    return pieces
 
 
 def _in_turn(

@@ -13,7 +13,7 @@ import json
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -25,14 +25,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from evaluator.counting import counted
 from evaluator.predictions.writing import write_predictions
-from evaluator.problems import Findings, Problem
+from evaluator.problems import Findings, Problem, reject
 from tsttc_baselines.folder_checks import require_complete, require_usable
 from tsttc_baselines.folders import SequenceFolder
 from tsttc_baselines.journals import Journal
 from tsttc_baselines.methods import Method, Value
 from tsttc_baselines.outcomes import Outcome, SequenceEstimator
+from tsttc_baselines.own_methods import code_of, is_own
 from tsttc_baselines.processes import worked_through
+
+MOST_FALLBACKS: Final = 0.95
+"""A run has fewer fallbacks than this share of its sequences."""
 
 MAX_REASONS: Final = 40
 """Reasons that the prediction file counts one by one."""
@@ -72,10 +77,11 @@ def run_method(
     """Estimate every sequence of `folder` and write the prediction file `out`, as scale ratios.
 
     An interrupted run leaves a journal next to `out`; the same call continues. With `strict`, a fallback
-    raises `Rejected` and nothing is written. Raises `Rejected` for an unusable folder, `WorkerEnded`,
-    `OutputInUse` and `OSError`.
+    raises `Rejected` and nothing is written; so does a run of nearly all fallbacks in any case. Raises
+    `Rejected` for an unusable folder, `WorkerEnded`, `OutputInUse`, `OSError`, and what the method raises.
     """
     filled = method.filled(parameters)
+    used = {**filled, **getattr(method.estimator(filled), "used", {})}
     require_usable(folder, method=method, frame_gap=frame_gap)
     if strict:
         require_complete(folder, method=method, frame_gap=frame_gap)
@@ -98,8 +104,9 @@ def run_method(
         in_order = [outcomes[row] for row in range(folder.n_sequences)]
         if strict:
             _require_no_fallback(in_order)
+        _require_estimates(in_order)
         seconds = journal.seconds + time.perf_counter() - began_s
-        done = _done(folder, method, filled, frame_gap, in_order, n_resumed=n_resumed, seconds=seconds)
+        done = _done(folder, method, used, frame_gap, in_order, n_resumed=n_resumed, seconds=seconds)
         _write_whole(out, done.data)
         journal.discard()
     return done
@@ -121,15 +128,17 @@ def _done(
     for outcome in outcomes:
         if outcome.reason and outcome.problem:
             examples.setdefault(outcome.reason, outcome.problem)
+    weights = _weights(parameters)
     meta = {
         "method": method.name,
         "version": tsttc_version(),
-        "provenance": method.provenance(parameters),
+        "provenance": method.provenance(parameters, digests=weights.get("weights")),
         "parameters": _plain(parameters),
         "seconds": round(seconds, 3),
         "n_fallback": _shortened(n_fallback),
         "opencv": cv2.__version__,
-        **_weights(parameters),
+        **weights,
+        **_code(method),
     }
     keys = folder.manifest.natural_keys if folder.has_own_numbers else folder.manifest.anno_id_keys
     data = write_predictions(keys=keys, scale_ratio=scale_ratio, frame_gap=frame_gap, meta=meta)
@@ -150,6 +159,7 @@ def _key(folder: SequenceFolder, method: Method, parameters: Mapping[str, Value]
         "method": method.name,
         "parameters": _plain(parameters),
         **_weights(parameters),
+        **_code(method),
         "frame_gap": frame_gap,
         "versions": [tsttc_version(), cv2.__version__, np.__version__],
     }
@@ -168,6 +178,11 @@ def _weights(parameters: Mapping[str, Value]) -> dict[str, dict[str, str]]:
     return {"weights": digests} if digests else {}
 
 
+def _code(method: Method) -> dict[str, dict[str, str]]:
+    # With other code of one's own method, a run does not continue.
+    return {"code": code_of(method)} if is_own(method) else {}
+
+
 def _shortened(n_fallback: Mapping[str, int]) -> dict[str, int]:
     reasons = list(n_fallback.items())
     rest = sum(count for _, count in reasons[MAX_REASONS:])
@@ -180,6 +195,20 @@ def _require_no_fallback(outcomes: Iterable[Outcome]) -> None:
         if outcome.problem is not None:
             findings.add(outcome.problem.code, outcome.problem.message, outcome.problem.where)
     findings.raise_if_any()
+
+
+def _require_estimates(outcomes: Sequence[Outcome]) -> None:
+    """Raise `Rejected` where nearly all values are fallbacks: something is wrong with the whole folder."""
+    problems = [outcome.problem for outcome in outcomes if outcome.problem is not None]
+    if len(problems) < MOST_FALLBACKS * len(outcomes):
+        return
+    [(reason, count)] = Counter(outcome.reason for outcome in outcomes if outcome.reason).most_common(1)
+    first = next(outcome.problem for outcome in outcomes if outcome.problem and outcome.reason == reason)
+    message = (
+        f"{len(problems):,} of {counted(len(outcomes), 'sequence')} have no estimate, {count:,} of them for "
+        f"this reason: {first.message}"
+    )
+    raise reject(first.code, message, first.where)
 
 
 def _write_whole(path: Path, data: bytes) -> None:

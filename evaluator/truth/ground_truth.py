@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from evaluator.arguments import Source
 from evaluator.metrics.protocol import TTCRange
@@ -239,6 +239,18 @@ class GroundTruth:
         """Count the sequences outside of these TTC ranges."""
         inside = [each.contains(self.ttc_s) for each in ranges]
         return self.n_sequences - int(np.count_nonzero(np.logical_or.reduce(inside)))
+
+    def subset(self, rows: ArrayLike) -> GroundTruth:
+        """The ground truth of some sequences, such as a fold: a mask (n,) of bools, or rows in any order.
+
+        Raises `IndexError` for rows that are not there, `Rejected` for none and for a row that comes twice.
+        """
+        chosen: list[int] = np.arange(self.n_sequences)[np.asarray(rows)].tolist()
+        table = self.to_table()
+        for column in fields(table):
+            values = getattr(table, column.name)
+            setattr(table, column.name, [values[row] for row in chosen] if values else values)
+        return GroundTruth.from_table(table)
 
     def to_table(self) -> Table:
         """Return the columns as lists."""

@@ -77,9 +77,10 @@ def test_wheel_holds_evaluator_and_baselines_alone(wheel: Path) -> None:
     present = {
         path.relative_to(REPOSITORY).as_posix()
         for folder in ("evaluator", "tsttc_baselines")
-        for path in (REPOSITORY / folder).rglob("*.py")
+        for pattern in ("*.py", "new_method/*.txt")
+        for path in (REPOSITORY / folder).rglob(pattern)
     }
-    assert present <= set(names), "every module of the two is in the wheel"
+    assert present <= set(names), "every module of the two is in the wheel, and every template"
 
 
 def test_environment_has_no_web_framework(environment: Path) -> None:

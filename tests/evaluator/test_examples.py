@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import importlib
 import re
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
-import numpy as np
 import pytest
 
-from evaluator import TTC_RANGES, Predictions, evaluate, read_predictions, read_truth
+from evaluator import TTC_RANGES, evaluate, read_predictions, read_truth
 from evaluator.cli import own_commands
 from evaluator.cli.exits import Exit
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY
@@ -78,32 +74,6 @@ def test_a_training_loop_gets_better_and_ends_with_a_file(tmp_path: Path) -> Non
     name, _, mid = worst.removeprefix("worst recording ").partition(": MiD ")
     assert name in read_truth(EXAMPLES / "truth.csv").manifest.bag_stamp
     assert float(mid.partition(" ")[0]) >= mid_by_epoch[-1]
-
-
-def callback(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """The callback of the example, as a program would import it."""
-    monkeypatch.syspath_prepend(str(EXAMPLES))
-    return importlib.import_module("lightning_callback").TsttcScores(EXAMPLES / "truth.csv")
-
-
-def test_the_lightning_callback_logs_the_scores_of_a_whole_epoch(monkeypatch: pytest.MonkeyPatch) -> None:
-    scores, logged = callback(monkeypatch), dict[str, float]()
-    trainer = SimpleNamespace(sanity_checking=False, world_size=1)
-    model = SimpleNamespace(log_dict=lambda values, **_: logged.update(values))
-    scores.on_validation_epoch_start(trainer, model)
-    for number, rows in enumerate(np.array_split(np.arange(60), 4)):
-        assert logged == {}
-        outputs = {"row": rows, "ttc_s": 1.1 * scores.truth.ttc_s[rows]}
-        scores.on_validation_batch_end(trainer, model, outputs, None, number)
-        if number < 3:
-            with pytest.warns(
-                UserWarning, match=f"no tsttc/ scores: {45 - 15 * number} of 60 sequences have no"
-            ):
-                scores.on_validation_epoch_end(trainer, model)
-    scores.on_validation_epoch_end(trainer, model)
-    scaled = Predictions.from_arrays(ttc_s=1.1 * scores.truth.ttc_s, manifest=scores.truth.manifest)
-    assert logged == {f"tsttc/{name}": value for name, value in evaluate(scaled, scores.truth).flat().items()}
-    assert len(scores.report.breakdown("recording")) == 6
 
 
 def test_every_program_is_named_where_the_examples_are_and_on_the_page() -> None:

@@ -66,7 +66,7 @@ def test_the_file_holds_every_sequence_and_how_it_was_made(folder: Path) -> None
     assert list(document["predictions"].values()) == done.scale_ratio.tolist()
     assert predictions.meta is not None
     assert set(predictions.meta) == {
-        *("method", "version", "provenance", "parameters", "seconds", "n_fallback", "opencv"),
+        *("method", "version", "provenance", "parameters", "seconds", "n_fallback", "opencv", "code"),
     }
     assert predictions.meta["parameters"] == {"power": 0.5, "constant": 0.0, "refused": -1, "broken": -1}
     assert predictions.meta["n_fallback"] == {}
@@ -78,7 +78,8 @@ def test_a_gap_of_one_looks_at_two_frames(folder: Path) -> None:
         for frame in range(4):
             image_path(folder, anno_id, frame).unlink()
     assert estimate(folder, frame_gap=1).n_fallback == {}
-    assert estimate(folder, frame_gap=2).n_fallback == {"image is missing": N - 1, "too few frames": 1}
+    with pytest.raises(Rejected, match=r"3 of 3 sequences .*, 2 of them .*: The image is missing"):
+        estimate(folder, frame_gap=2)
 
 
 # --- what is wrong with one sequence ---------------------------------------------------------------------
@@ -202,8 +203,8 @@ def test_what_a_method_cannot_say_and_where_it_fails_take_the_fallback(folder: P
 
 
 def test_an_estimate_that_no_file_may_hold_takes_the_fallback(folder: Path) -> None:
-    done = estimate(folder, constant=-0.5)
-    assert done.n_fallback == {"estimate is not a positive number": N}
+    with pytest.raises(Rejected, match=r"3 of 3 sequences .*: The estimate is -0\.5; expected a finite"):
+        estimate(folder, constant=-0.5)
 
 
 # --- interrupted runs ------------------------------------------------------------------------------------

@@ -14,10 +14,9 @@ from evaluator.cli.options import default_option, json_option
 from evaluator.cli.reading import FOLDER, naming
 from evaluator.counting import counted
 from tsttc_baselines.cli import require_opencv
-from tsttc_baselines.cli.options import TRUTH, jobs_option, truth_option
+from tsttc_baselines.cli.options import jobs_option, truth_option
 
 if TYPE_CHECKING:
-    from evaluator import GroundTruth
     from tsttc_baselines.ablation import Ablation, AblationRow
 
 NAMES: Final = ("bins", "frame-gap", "shift", "expansion")
@@ -46,15 +45,17 @@ def ablate(
       tsttc baseline ablate bins frames/ --truth val.csv --json
     """
     require_opencv()
+    from evaluator import read_truth  # noqa: PLC0415 -- numpy, which --help can do without
     from tsttc_baselines.ablation import (  # noqa: PLC0415 -- needs OpenCV
         get_ablation,
         scores_of_settings,
     )
     from tsttc_baselines.cli.progress import shown_progress  # noqa: PLC0415 -- as above
-    from tsttc_baselines.folders import read_folder  # noqa: PLC0415 -- as above
+    from tsttc_baselines.folders import read_folder, read_folder_truth  # noqa: PLC0415 -- as above
 
     ablation = get_ablation(name)
-    truth = _truth(folder, truth_path)
+    with naming(truth_path or folder):
+        truth = read_truth(truth_path) if truth_path else read_folder_truth(folder)
     with naming(folder):
         sequences = read_folder(folder)
         n_estimates = len(ablation.settings) * sequences.n_sequences
@@ -71,18 +72,6 @@ def ablate(
         echo_json(_document(ablation, rows, variant=variant, n_sequences=sequences.n_sequences))
         return
     click.echo("\n".join(_in_words(ablation, rows, n_sequences=sequences.n_sequences)))
-
-
-def _truth(folder: Path, path: Path | None) -> GroundTruth:
-    from evaluator import read_truth  # noqa: PLC0415 -- numpy, which --help can do without
-
-    own = folder / TRUTH
-    source = path or (own if own.exists() else folder)
-    if source == folder and next(folder.rglob("*.pkl"), None) is None:
-        message = f"{folder} has neither {TRUTH} nor annotation files; expected one of them, or --truth FILE."
-        raise click.UsageError(message)
-    with naming(source):
-        return read_truth(source)
 
 
 def _document(

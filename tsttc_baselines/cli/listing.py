@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
 import click
 
 from evaluator.cli.failures import echo_json
+from evaluator.cli.layout import printable
 from evaluator.cli.options import json_option
 from tsttc_baselines.methods import METHODS, Method, Parameter
+from tsttc_baselines.own_methods import MethodMissing, find_method, is_own, points
 
 
 @click.command("list", short_help="List the methods and their parameters.")
@@ -17,20 +20,32 @@ from tsttc_baselines.methods import METHODS, Method, Parameter
 def list_methods(*, as_json: bool) -> None:
     """List the methods that `tsttc baseline run` knows, with their parameters and defaults.
 
-    "as published" names the parameters of a published row; "unpublished" is a method of this project.
+    "as published" names the parameters of a published row; "unpublished" is a method that no paper has.
+    Installed packages may add methods, by entry points of `tsttc.methods`.
 
     \b
     Example:
       tsttc baseline list
     """
     if as_json:
-        echo_json([_document(method) for method in METHODS])
+        echo_json([_document(method) for method in _methods()])
         return
-    for method in METHODS:
+    for method in _methods():
         click.echo(f"{method.name}  {method.title}; {_provenance(method)}.")
         click.echo(f"  {method.summary}")
         for parameter in method.parameters:
-            click.echo(f"  {parameter.option} {parameter_in_words(parameter)}")
+            option = f"--set {parameter.name}=" if is_own(method) else f"{parameter.option} "
+            click.echo(f"  {option}{parameter_in_words(parameter)}")
+
+
+def _methods() -> Iterator[Method]:
+    """All that there are; one that cannot be loaded is named on standard error."""
+    yield from METHODS
+    for point in points():
+        try:
+            yield find_method(point.name)
+        except MethodMissing as missing:
+            click.echo(printable(str(missing)), err=True)
 
 
 def parameter_in_words(parameter: Parameter) -> str:

@@ -11,6 +11,7 @@ from typing import Final
 import click
 
 EVERY_S: Final = 5.0
+FIRST_S: Final = 1.0
 
 
 @contextmanager
@@ -60,14 +61,15 @@ class _Lines:
         self._total = total
         self._began_s = self._shown_s = time.monotonic()
         self._n_first: int | None = None
+        self._wait_s = FIRST_S
 
     def show(self, n_done: int) -> None:
         now_s = time.monotonic()
         if self._n_first is None:
             self._n_first, self._began_s = n_done, now_s
-        if now_s - self._shown_s < EVERY_S:
+        if now_s - self._shown_s < self._wait_s:
             return
-        self._shown_s = now_s
+        self._shown_s, self._wait_s = now_s, EVERY_S
         per_s = (n_done - self._n_first) / max(now_s - self._began_s, 1e-9)
-        left = f", {(self._total - n_done) / per_s:,.0f} s left" if per_s > 0 else ""
-        click.echo(f"{n_done:,} of {self._total:,} sequences, {per_s:,.1f}/s{left}", err=True)
+        rate = f", {per_s:,.1f}/s, {(self._total - n_done) / per_s:,.0f} s left" if per_s > 0 else ""
+        click.echo(f"{n_done:,} of {self._total:,} sequences{rate}", err=True)

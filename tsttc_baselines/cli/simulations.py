@@ -128,21 +128,23 @@ def render(
 ) -> None:
     """Render sequences with known truth into FOLDER, which `tsttc baseline run` takes.
 
-    FOLDER is new or empty; it gets manifest.csv, boxes.csv, truth.csv and images/. The images show the
-    surroundings of one vehicle each. Each sequence follows from the seed and its anno_id, so --first and
-    --count render any part of a split as it is in the whole.
+    FOLDER is new or empty; it gets manifest.csv, boxes.csv, truth.csv and images/. If a rendering is
+    interrupted, the same command continues it. The images show the surroundings of one vehicle each. Each
+    sequence follows from the seed and its anno_id, so --first and --count render any part of a split as it is
+    in the whole.
 
     \b
     Examples:
       tsttc baseline render frames/ --sequences 12 --seed 7
       tsttc baseline render part/ --like test --sequences 28600 --seed 1 --first 500 --count 20
     """
-    _require_empty(folder)
     require_opencv()
     from tsttc_baselines.cli.progress import shown_progress  # noqa: PLC0415 -- OpenCV, which --help can do without
     from tsttc_baselines.processes import WorkerEnded  # noqa: PLC0415 -- as above
-    from tsttc_baselines.rendering.folders import write_folder  # noqa: PLC0415 -- as above
+    from tsttc_baselines.rendering.folders import PART, OtherRendering, write_folder  # noqa: PLC0415 -- as above
 
+    if not (folder / PART).is_file():
+        _require_empty(folder)
     split = _draw(**options)
     if first >= split.n_sequences:
         message = f"{first}; expected an anno_id of the split, 0 to {split.n_sequences - 1}."
@@ -158,8 +160,14 @@ def render(
                 n_processes=n_processes,
                 progress=progress,
             )
+    except OtherRendering:
+        message = f"{folder} has an interrupted rendering of other options; expected these, or a new folder."
+        raise click.BadParameter(message, param_hint="FOLDER") from None
     except WorkerEnded:
-        message = "A process of the run ended, probably because memory ran out; try again with fewer --jobs."
+        message = (
+            "A process of the run ended, probably because memory ran out; "
+            "the same command with fewer --jobs continues the rendering."
+        )
         raise Failure(message, exit_code=Exit.REJECTED, code="worker-ended") from None
     except OSError as error:
         message = f"{error.filename or folder} cannot be written: {error.strerror}."

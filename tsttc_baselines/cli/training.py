@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -15,12 +16,12 @@ from evaluator.cli.options import default_option, json_option
 from evaluator.cli.reading import FOLDER, naming
 from evaluator.counting import counted
 from tsttc_baselines.cli import require_opencv
-from tsttc_baselines.cli.options import TRUTH, out_option, require_writable
+from tsttc_baselines.cli.options import out_option, require_writable
 
 if TYPE_CHECKING:
-    from tsttc_baselines.deep_scale.samples import Source
-    from tsttc_baselines.deep_scale.training import Epoch
+    from tsttc_baselines.deep_scale.training import Epoch, Recipe
     from tsttc_baselines.deep_scale.weights import Use, Weights
+    from tsttc_baselines.pairs import Source
 
 # Not that of the sequences on which documents compare the methods (7).
 _VALIDATION_SEED = 13
@@ -100,6 +101,12 @@ def _or_of_start(default: str) -> str:
     show_default=_or_of_start("16"),
     help="Pixels around what is compared.",
 )
+@click.option(
+    "--log",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write the figures of each epoch to this CSV file.",
+)
 @click.option("--start", type=_FILE, help="Begin with the weights of this file, used as they were.")
 @default_option("--seed", type=click.IntRange(0, 2**32 - 1), default=0)
 @default_option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu")
@@ -112,6 +119,7 @@ def train(
     n_sequences: int,
     n_val: int,
     start: Path | None,
+    log: Path | None,
     device: str,
     as_json: bool,
     **recipe: Any,
@@ -142,20 +150,24 @@ def train(
     source = _folder_source(folder) if folder else _rendered(n_sequences, seed=1000 + recipe["seed"])
     validation = _folder_source(val_folder) if val_folder else _rendered(n_val, seed=_VALIDATION_SEED)
     total = source.truth.n_sequences * recipe["epochs"]
+    wanted_recipe = training.Recipe(use=wanted, **recipe)
+    click.echo(_plan(source, validation, wanted_recipe), err=True)
+    after_epoch = _Follower(log).follow
     try:
         with naming(folder or out), shown_progress("Deep Scale", total=total) as progress:
             epochs = training.train(
                 source=source,
                 validation=training.Validation(validation),
-                recipe=training.Recipe(use=wanted, **recipe),
+                recipe=wanted_recipe,
                 out=out,
                 start=weights,
                 device=device,
                 progress=progress,
-                after_epoch=_tell,
+                after_epoch=after_epoch,
             )
     except OSError as error:
-        raise click.BadParameter(f"{out} cannot be written: {error.strerror}.", param_hint="--out") from None
+        name = error.filename or out
+        raise click.BadParameter(f"{name} cannot be written: {error.strerror}.", param_hint="--out") from None
     except training.DeviceMissing:
         message = "--device cuda needs a graphics card that torch can use; expected cpu here."
         raise click.UsageError(message) from None
@@ -195,7 +207,7 @@ def _contradiction(name: str, value: Any, use: Use) -> str:
 def _rendered(n_sequences: int, *, seed: int) -> Source:
     import numpy as np  # noqa: PLC0415 -- --help can do without
 
-    from tsttc_baselines.deep_scale.samples import RenderedSequences  # noqa: PLC0415 -- as above
+    from tsttc_baselines.pairs import RenderedSequences  # noqa: PLC0415 -- as above
     from tsttc_baselines.simulation import split  # noqa: PLC0415 -- as above
 
     drawn = split(
@@ -205,21 +217,57 @@ def _rendered(n_sequences: int, *, seed: int) -> Source:
 
 
 def _folder_source(path: Path) -> Source:
-    from evaluator import read_truth  # noqa: PLC0415 -- as above
-    from tsttc_baselines.deep_scale.samples import FolderSequences  # noqa: PLC0415 -- --help can do without
-    from tsttc_baselines.folders import read_folder  # noqa: PLC0415 -- as above
+    from tsttc_baselines.pairs import FolderSequences  # noqa: PLC0415 -- --help can do without
 
-    has_table = (path / TRUTH).is_file()
     with naming(path):
-        return FolderSequences.of(read_folder(path), read_truth(path / TRUTH if has_table else path))
+        return FolderSequences.read(path)
 
 
-def _tell(epoch: Epoch) -> None:
+def _plan(source: Source, validation: Source, recipe: Recipe) -> str:
+    learned, scored = (counted(each.truth.n_sequences, "sequence") for each in (source, validation))
+    return (
+        f"{counted(recipe.epochs, 'epoch')} of {learned}, scored on {scored}; learning rate up to "
+        f"{recipe.lr_per_pair * recipe.batch:.3g}."
+    )
+
+
+class _Follower:
+    """Prints a line for each epoch on standard error, and keeps the log up to date."""
+
+    def __init__(self, log: Path | None) -> None:
+        self._log = log
+        self._n_printed: int | None = None
+
+    def follow(self, epochs: Sequence[Epoch]) -> None:
+        """Take the epochs until now; the first call has those from before."""
+        if self._n_printed is None and epochs and epochs[-1].number:
+            click.echo(f"The interrupted training continues after epoch {epochs[-1].number}.", err=True)
+        for epoch in epochs[self._n_printed or 0 :]:
+            click.echo(_in_words(epoch), err=True)
+        self._n_printed = len(epochs)
+        if self._log is not None:
+            self._log.write_text("\n".join([_LOG_HEADER, *map(_log_line, epochs), ""]))
+
+
+def _in_words(epoch: Epoch) -> str:
     prefix = f"epoch {epoch.number}: loss {epoch.loss:.3f}, " if epoch.number else "before epoch 1: "
     line = f"{prefix}MiD {epoch.mid:.1f}, RTE {epoch.rte:.1f} %"
+    if epoch.learning_rate is not None:
+        line += f", learning rate {epoch.learning_rate:.3g}"
     if epoch.n_left_out:
         line += f"; {counted(epoch.n_left_out, 'sequence')} left out"
-    click.echo(line, err=True)
+    return line
+
+
+_LOG_HEADER: Final = (
+    "epoch,learning_rate,loss,n_left_out,mid,rte,mid_crucial,mid_small,mid_large,mid_negative"
+)
+
+
+def _log_line(epoch: Epoch) -> str:
+    values = [epoch.number, epoch.learning_rate, epoch.loss, epoch.n_left_out, epoch.mid, epoch.rte]
+    by_range = [epoch.mid_by_range.get(name) for name in ("crucial", "small", "large", "negative")]
+    return ",".join("" if value is None else str(value) for value in (*values, *by_range))
 
 
 def _report(epochs: list[Epoch], *, out: Path, as_json: bool) -> None:

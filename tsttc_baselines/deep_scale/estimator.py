@@ -52,6 +52,7 @@ class DeepScale:
     ) -> None:
         loaded = read_weights(weights)
         self._use = loaded.use if decoding == "auto" else replace(loaded.use, decoding=decoding)
+        self.used = {"decoding": self._use.decoding}
         self._scales = network_scales()
         self._operations = operations_on(device, loaded)
 

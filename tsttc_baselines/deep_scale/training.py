@@ -30,11 +30,12 @@ from tsttc_baselines.deep_scale.estimator import N_TOP, cut, network_logits, net
 from tsttc_baselines.deep_scale.fit import equations, evened, fitted_scale_ratio, solution, weighting
 from tsttc_baselines.deep_scale.fit_samples import FitSample
 from tsttc_baselines.deep_scale.network import features
-from tsttc_baselines.deep_scale.samples import Sample, Source, batches, usable_pair
+from tsttc_baselines.deep_scale.samples import Sample, batches
 from tsttc_baselines.deep_scale.torch_layers import TorchLayers
 from tsttc_baselines.deep_scale.weights import SHAPES, Use, Weights, write_weights
 from tsttc_baselines.detection import scale_ratio_of_two
 from tsttc_baselines.estimates import Unusable
+from tsttc_baselines.pairs import Source, usable_pair
 
 Floats = NDArray[np.float64]
 Optimizer = Literal["sgd", "adam"]
@@ -92,7 +93,7 @@ class Recipe:
 class Epoch:
     """An epoch's mean loss of a pair, and the evaluator's scores; number 0 is the start, without a loss."""
 
-    # `n_left_out` counts sequences without usable frames, boxes or scale ratio.
+    # `n_left_out` counts sequences without usable frames, boxes or scale ratio; the rate is the last step's.
 
     number: int
     n_left_out: int
@@ -100,6 +101,7 @@ class Epoch:
     mid: float
     rte: float
     mid_by_range: dict[str, float | None]
+    learning_rate: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,14 +276,14 @@ def train(
     start: Weights | None = None,
     device: str = "cpu",
     progress: Progress = lambda _n_done: None,
-    after_epoch: Callable[[Epoch], None] = lambda _epoch: None,
+    after_epoch: Callable[[Sequence[Epoch]], None] = lambda _epochs: None,
 ) -> list[Epoch]:
     """Train, and write the weights of the epoch with the least MiD to `out`.
 
     A `start` is scored as epoch 0, with `recipe.use`, which should be its own. `progress` gets the number of
-    trained sequences of all epochs. An interrupted training leaves `out` with `.part`; the same call
-    continues after the last whole epoch. Raises `Rejected` if no sequence is usable, `DeviceMissing` and
-    `OSError`.
+    trained sequences of all epochs, `after_epoch` the epochs until then, and before the first those of an
+    interrupted training. That leaves `out` with `.part`; the same call continues after the last whole epoch.
+    Raises `Rejected` if no sequence is usable, `DeviceMissing` and `OSError`.
     """
     if device == "cuda" and not torch.cuda.is_available():
         raise DeviceMissing
@@ -291,8 +293,7 @@ def train(
     if start is not None and not epochs:
         scores = validation.scores(network.operations(), use=recipe.use)
         epochs.append(_epoch(scores, number=0, losses=(), n_left_out=0))
-    for epoch in epochs:
-        after_epoch(epoch)
+    after_epoch(tuple(epochs))
     n_rows = source.truth.n_sequences
     n_before = epochs[-1].number if epochs else 0
     n_done = n_before * n_rows
@@ -314,22 +315,32 @@ def train(
             raise reject("empty", message)
         n_done = (number + 1) * n_rows
         scores = validation.scores(network.operations(), use=recipe.use)
-        epoch = _epoch(scores, number=number + 1, losses=losses, n_left_out=n_rows - len(losses))
+        n_left_out = n_rows - len(losses)
+        epoch = _epoch(scores, number=number + 1, losses=losses, n_left_out=n_left_out, learning_rate=rate)
         is_best = all(epoch.mid <= earlier.mid for earlier in epochs if earlier.number)
         epochs.append(epoch)
         if is_best:
             write_weights(out, network.weights(card=card_of(recipe, source, epochs)))
         _keep(part, key=key, network=network, epochs=epochs)
-        after_epoch(epoch)
+        after_epoch(tuple(epochs))
     part.unlink(missing_ok=True)
     return epochs
 
 
-def _epoch(scores: dict[str, Any], *, number: int, losses: Sequence[float], n_left_out: int) -> Epoch:
+def _epoch(
+    scores: dict[str, Any],
+    *,
+    number: int,
+    losses: Sequence[float],
+    n_left_out: int,
+    learning_rate: float | None = None,
+) -> Epoch:
     overall = scores.pop("overall")
     by_range = {name: means["mid"] for name, means in scores.items()}
     loss = float(np.mean(losses)) if losses else None
-    return Epoch(number, n_left_out, loss, float(overall["mid"]), float(overall["rte"]), by_range)
+    return Epoch(
+        number, n_left_out, loss, float(overall["mid"]), float(overall["rte"]), by_range, learning_rate
+    )
 
 
 def card_of(recipe: Recipe, source: Source, epochs: Sequence[Epoch]) -> dict[str, Any]:

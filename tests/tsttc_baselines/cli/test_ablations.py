@@ -40,8 +40,11 @@ def test_the_table_is_a_document_too(tsttc: Tsttc, frames: Path) -> None:
 def test_a_folder_without_a_truth_needs_one(tsttc: Tsttc, frames: Path) -> None:
     (frames / "truth.csv").unlink()
     result = tsttc("baseline", "ablate", "bins", frames)
-    assert result.exit_code == 2
-    assert "neither truth.csv nor annotation files; expected one of them, or --truth FILE." in result.stderr
+    assert result.exit_code == 1
+    assert (
+        "The folder has neither truth.csv nor annotation files (*.pkl); expected its ground truth."
+        in result.stderr
+    )
 
 
 @pytest.mark.parametrize("suffix", ["svg", "png"])

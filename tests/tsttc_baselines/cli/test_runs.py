@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.evaluator.worlds import Tsttc
-from tests.tsttc_baselines.made_folders import made_folder, write_boxes
+from tests.tsttc_baselines.made_folders import box, made_folder, write_boxes
 from tsttc_baselines.methods import METHODS, Method
 
 
@@ -55,6 +55,34 @@ def test_fallbacks_are_counted_by_reason_with_an_example(tsttc: Tsttc, folder: P
     )
     assert document["n_fallback"] == {"no box in the target frame": 1, "box is reversed": 1}
     assert document["n_sequences"] == 3
+
+
+def test_a_run_that_is_nearly_all_fallbacks_is_a_fault(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:
+    write_boxes(folder, changes={(anno_id, 5): (50, 30, 51, 60) for anno_id in range(3)})
+    out = tmp_path / "p.json"
+    result = tsttc("baseline", "run", "detection", folder, "--out", out)
+    assert result.exit_code == 1
+    assert (
+        "boxes.csv, sequence 0: 3 of 3 sequences have no estimate, 3 of them for this reason: The box of "
+        "frame 5 is (50, 30, 51, 60); expected sides of at least 4 px." in " ".join(result.stderr.split())
+    )
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(("low", "name"), [(0, "x"), (1, "y")])
+def test_columns_of_boxes_that_are_swapped_are_named(
+    tsttc: Tsttc, folder: Path, tmp_path: Path, low: int, name: str
+) -> None:
+    boxes = {(anno_id, frame): list(box(frame)) for anno_id in range(3) for frame in range(6)}
+    for values in boxes.values():
+        values[low], values[low + 2] = values[low + 2], values[low]
+    write_boxes(folder, changes=boxes)
+    result = tsttc("baseline", "run", "detection", folder, "--out", tmp_path / "p.json")
+    assert result.exit_code == 1
+    assert (
+        f"boxes.csv: {name}1 and {name}2 are swapped: 3 of 3 sequences have a box with {name}2 < {name}1; "
+        f"expected {name}1 < {name}2." in " ".join(result.stderr.split())
+    )
 
 
 def test_strict_exits_1_and_writes_nothing(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:

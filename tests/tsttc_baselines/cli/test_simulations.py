@@ -3,9 +3,12 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.evaluator.worlds import Tsttc
+from tsttc_baselines import simulation
+from tsttc_baselines.rendering.folders import PART, write_folder
 
 SPLIT = ("--sequences", "12", "--recordings", "3", "--seed", "7")
 
@@ -37,6 +40,32 @@ def test_a_part_of_a_split_is_rendered_as_in_the_whole_by_any_number_of_processe
     assert set((part / "boxes.csv").read_text().splitlines()) <= set(
         (whole / "boxes.csv").read_text().splitlines()
     )
+
+
+def test_an_interrupted_rendering_continues_with_the_same_options_alone(tsttc: Tsttc, tmp_path: Path) -> None:
+    whole, ended = tmp_path / "whole", tmp_path / "ended"
+    split = simulation.split(rng=np.random.default_rng(7), n_sequences=12, n_recordings=3)
+
+    def end(n_done: int) -> None:
+        if n_done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_folder(split, seed=7, path=ended, rows=range(6), progress=end)
+    with (ended / PART).open("a") as part:
+        part.write("[3, [[")  # as it is when a machine stops in the midst of a line
+    untouched = next(ended.rglob("*.jpg"))
+    before = untouched.stat().st_mtime_ns
+    other = tsttc("baseline", "render", ended, *SPLIT, "--count", "5", "--jobs", "1")
+    assert other.exit_code == 2
+    assert "has an interrupted rendering of other options; expected these, or a new folder." in " ".join(
+        other.stderr.split()
+    )
+    for folder in (whole, ended):
+        result = tsttc("baseline", "render", folder, *SPLIT, "--count", "6", "--jobs", "1")
+        assert result.exit_code == 0, result.stderr
+    assert content(ended) == content(whole)
+    assert untouched.stat().st_mtime_ns == before, "what was there is not rendered again"
 
 
 def test_simulate_and_render_draw_the_same_split(tsttc: Tsttc, tmp_path: Path) -> None:

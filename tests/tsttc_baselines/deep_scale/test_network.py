@@ -1,6 +1,5 @@
 """The network's parts against their definitions, and numpy against torch."""
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +97,7 @@ def scene() -> Clip:
     return planted(0.8)
 
 
-@pytest.mark.skipif(find_spec("torch") is None, reason="torch is not installed: pip install '.[train]'")
+@pytest.mark.torch
 @pytest.mark.parametrize("similarity", ["dot", "cosine"])
 def test_numpy_and_torch_give_the_same(scene: Clip, similarity: Any) -> None:
     use = Use(similarity=similarity, n_cells=10, max_box_px=24.0, margin_px=8.0)

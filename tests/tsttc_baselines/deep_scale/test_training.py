@@ -12,19 +12,14 @@ from numpy.typing import NDArray
 from evaluator import GroundTruth, read_truth
 from tests.tsttc_baselines.made_folders import made_folder, stamp
 from tsttc_baselines.clips import Clip
-from tsttc_baselines.deep_scale.samples import (
-    FolderSequences,
-    RenderedSequences,
-    Sample,
-    batches,
-    usable_pair,
-)
+from tsttc_baselines.deep_scale.samples import Sample, batches
 from tsttc_baselines.deep_scale.weights import Decoding, Use, Weights, read_weights
 from tsttc_baselines.folders import read_folder
 from tsttc_baselines.methods import OWN_WEIGHTS
+from tsttc_baselines.pairs import FolderSequences, RenderedSequences, usable_pair
 from tsttc_baselines.simulation import split
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.torch]
 
 SMALL = Use(similarity="cosine", n_cells=10, max_box_px=16.0, margin_px=4.0)
 
@@ -32,7 +27,8 @@ SMALL = Use(similarity="cosine", n_cells=10, max_box_px=16.0, margin_px=4.0)
 @pytest.fixture(scope="module")
 def training() -> Any:
     """The module that trains, which needs torch."""
-    torch = pytest.importorskip("torch", reason="torch is not installed: pip install '.[train]'")
+    import torch  # noqa: PLC0415 -- where there is none, `tests/conftest.py` leaves this out
+
     torch.set_num_threads(1)
     from tsttc_baselines.deep_scale import training  # noqa: PLC0415 -- it imports torch
 
@@ -77,8 +73,9 @@ class Ended(Exception):
     """Ends a training, as Ctrl-C does."""
 
 
-def end(_epoch: object) -> None:
-    raise Ended
+def end(epochs: tuple[object, ...]) -> None:
+    if epochs:
+        raise Ended
 
 
 def test_an_ended_training_goes_on_as_if_nothing_had_been(
@@ -142,10 +139,11 @@ def test_with_a_start_the_score_before_epoch_1_comes_first_and_no_rate_keeps_it(
     known = {"source": rows, "validation": training.Validation(rows), "recipe": recipe, "start": start}
     reported: list[Any] = []
     epochs = training.train(**known, out=tmp_path / "w.npz", after_epoch=reported.append)
-    assert reported == epochs
+    assert reported == [tuple(epochs[:1]), tuple(epochs)]
     assert [epoch.number for epoch in epochs] == [0, 1]
     before, after = epochs
-    assert (before.loss, before.n_left_out) == (None, 0)
+    assert (before.loss, before.n_left_out, before.learning_rate) == (None, 0, None)
+    assert 0 < after.learning_rate <= 2e-12
     scored = training.Validation(rows).scores(
         training.Network(as_torch(training, start), recipe=recipe, device="cpu").operations(), use=start.use
     )
