@@ -148,6 +148,7 @@ VALUES: Final = {"ttc": "ttc", "ttc_s": "ttc", "scale_ratio": "scale_ratio"}
 RATES: Final = ("fps", "frame_gap")
 
 _NAMES: Final = frozenset({"anno_id", *NATURAL_KEY, *VALUES, *RATES})
+_OTHER_SEPARATORS: Final = {";": "semicolons", "\t": "tabs"}
 _FIRST_LINE: Final = re.compile(rb"\s*([^\r\n]{0,2000})")
 _NUMBER: Final = re.compile(
     r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?(?:nan|inf|infinity)", re.IGNORECASE
@@ -162,6 +163,10 @@ def json_of(data: bytes, *, max_rows: int | None = None) -> bytes:
     """Return the JSON text of a prediction file; raises `Rejected` for a damaged or too large one."""
     if data.startswith(GZIP):
         data = _unpacked(data)
+    for separator, name in _OTHER_SEPARATORS.items():
+        if _is_table(data, separator=separator):
+            message = f"The fields of the table are separated by {name}; expected commas."
+            raise reject("bad-csv", message, "line 1")
     return _of_table(data, max_rows=max_rows) if _is_table(data) else data
 
 
@@ -205,11 +210,11 @@ def _member(data: bytes, start: int, *, max_bytes: int) -> tuple[bytes, int]:
     return b"".join(parts), start
 
 
-def _is_table(data: bytes) -> bool:
+def _is_table(data: bytes, *, separator: str = ",") -> bool:
     # No JSON text begins with the columns of a table.
     match = _FIRST_LINE.match(data.removeprefix(b"\xef\xbb\xbf"))
     line = match[1] if match else b""
-    fields = line.decode("utf-8", "replace").split(",")
+    fields = line.decode("utf-8", "replace").split(separator)
     return (
         len(fields) > 1
         and not line.startswith((b"{", b"["))

@@ -26,8 +26,8 @@ MAX_ROUGHNESS: Final = 0.8
 MIN_CORRELATION: Final = 0.3
 MAX_FLIPPED: Final = 0.3
 
-MIN_VALUES: Final = 100
-"""Of fewer values nothing is said."""
+MIN_VALUES: Final = 20
+"""Of fewer values nothing is said, neither of their unit nor beside true ones."""
 
 MIN_SHARE: Final = 0.99
 """Of the values that look like another unit."""
@@ -103,17 +103,19 @@ def warnings_with_truth(predictions: Predictions, truth: GroundTruth) -> list[Fi
 
 def _truth_warnings(predictions: Predictions, truth: GroundTruth) -> list[FileWarning]:
     predicted, true = order_of(predictions.ttc_s), order_of(truth.ttc_s)
-    if truth.n_sequences < MIN_PAIRS or predicted.std() == 0 or true.std() == 0:
+    if truth.n_sequences < MIN_VALUES or predicted.std() == 0 or true.std() == 0:
         return []
     correlation = float(np.corrcoef(predicted, true)[0, 1])
     flipped = float(np.mean((predictions.ttc_s < 0) != (truth.ttc_s < 0)))
     has_both_signs = bool((predictions.ttc_s < 0).any() and (predictions.ttc_s > 0).any())
     if correlation >= MIN_CORRELATION and not (has_both_signs and flipped > MAX_FLIPPED):
         return []
-    is_mirrored = correlation < -MIN_CORRELATION
-    cause = (
-        "Probably every sign is wrong: τ is negative when the object moves away." if is_mirrored else _CAUSE
-    )
+    inverse = order_of(1 / predictions.ttc_s)
+    cause = _CAUSE
+    if flipped > MAX_FLIPPED and correlation < -MIN_CORRELATION:
+        cause = "Probably every sign is wrong: τ is negative when the object moves away."
+    elif flipped <= MAX_FLIPPED and float(np.corrcoef(inverse, true)[0, 1]) >= MIN_CORRELATION:
+        cause = "Probably the values are inverse times, 1/τ; expected seconds."
     message = (
         f"The predictions hardly go with the true times: their rank correlation is {correlation:.2f}, and "
         f"{100 * flipped:.0f} % have the opposite sign; expected at least {MIN_CORRELATION} and at most "

@@ -67,6 +67,8 @@ def test_gzip_is_unpacked_all_its_members_and_named_by_the_bytes_that_were_sent(
         (table("anno_id", "note"), "missing-columns", 'has the columns "anno_id,note"; expected', "line 1"),
         (table("anno_id", "scale_ratio"), "missing-columns", "scale_ratio with fps or frame_gap", "line 1"),
         (table("ttc", "note"), "missing-columns", "expected anno_id, or bag_stamp", "line 1"),
+        (b"anno_id;ttc\n0;1\n", "bad-csv", "are separated by semicolons; expected commas.", "line 1"),
+        (b"anno_id\tttc\n0\t1\n", "bad-csv", "are separated by tabs; expected commas.", "line 1"),
         (b"anno_id,ttc\n0,1,2\n", "bad-csv", "The row has 3 fields; expected 2, as the header.", "row 1"),
         (b'anno_id,ttc\n0,"1\n', "bad-csv", "This is not a CSV table: unexpected end of data.", "line 2"),
         (b"anno_id,ttc\n0,\xff\n", "not-utf8", "Byte 14 of the table is not UTF-8", "byte 14"),

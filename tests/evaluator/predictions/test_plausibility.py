@@ -1,5 +1,6 @@
 """Warnings: of files whose values belong to other sequences, and of no others."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from evaluator.problems import WARNING_CODES
 from evaluator.truth.csv_tables import Table
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply
 from tests.evaluator.toolkit_folders import driving_folder
-from tests.evaluator.worlds import Tsttc, flat, make_truth
+from tests.evaluator.worlds import EXAMPLES, Tsttc, flat, make_truth
 
 RNG = np.random.default_rng(7)
 
@@ -68,8 +69,22 @@ def test_scale_ratios_without_their_unit_are_distinguished_from_seconds(driven: 
     # Without the two values in a hundred that leave the range.
     ratios = np.clip(1 / (1 + 1 / (2 * driven.ttc_s)), 0.55, 1.45)
     assert {"looks-like-ratios"} <= set(codes(driven, ratios)[0])
-    few = make_truth([1.0 + n / 200 for n in range(90)])
+    few = make_truth([1.0 + n / 200 for n in range(19)])
     assert codes(few, few.ttc_s) == ([], [])
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        (lambda ttc_s: -ttc_s, "Probably every sign is wrong"),
+        (lambda ttc_s: 1 / ttc_s, "Probably the values are inverse times, 1/τ; expected seconds."),
+        (RNG.permutation, "Probably the anno_ids are those of the toolkit"),
+    ],
+)
+def test_sixty_sequences_are_enough_to_name_the_cause(change: Callable[[Floats], Floats], cause: str) -> None:
+    truth = read_truth(EXAMPLES / "truth.csv")
+    [warning] = warnings_with_truth(predicted(truth, change(truth.ttc_s)), truth)
+    assert cause in warning.message
 
 
 def test_scale_ratios_of_their_own_unit_are_not_warned_of(driven: GroundTruth) -> None:
