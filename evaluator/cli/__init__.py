@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import sys
 from importlib import import_module
-from typing import Final
+from typing import Any, Final
 
 import click
 
@@ -45,20 +46,38 @@ COMMANDS: Final = {
 """Each command in the order of the help, with its module here and its name there; imported when used."""
 
 
+DISK_FAULTS: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO})
+
+
 class _Group(click.Group):
     """The group `tsttc`: words failures, handles Ctrl-C, replaces characters that a terminal lacks."""
+
+    def main(self, *args: Any, **extra: Any) -> Any:
+        try:
+            return super().main(*args, **extra)
+        except OSError as error:
+            if error.errno not in DISK_FAULTS or error.filename is not None:
+                raise
+            # What is still buffered would fail once more when Python ends.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno() if sys.__stdout__ else 1)
+            click.echo(f"Error: Standard output cannot be written: {error.strerror}.", err=True)
+            sys.exit(Exit.USAGE)
 
     def invoke(self, ctx: click.Context) -> object:
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="replace")
-        if os.environ.get("NO_COLOR"):
+        if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
             ctx.color = False
         try:
             return super().invoke(ctx)
         except Failure as failure:
             failure.show()
             ctx.exit(failure.exit_code)
+        except click.BadParameter as fault:
+            if not isinstance(fault, click.MissingParameter):
+                fault.ctx = None  # the value is at fault, not the form of the call: no usage lines
+            raise
         except KeyboardInterrupt:
             click.echo("Interrupted.", err=True)
             ctx.exit(Exit.INTERRUPTED)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from evaluator.cli.connection import connect
+from evaluator.cli.connection import connect, unknown_split
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name
-from evaluator.cli.options import default_option, json_option, sendable, slug, url_option
+from evaluator.cli.options import default_option, json_option, sendable, site_options, slug, url_option
 from evaluator.cli.paths import keep_server_of_login, server_of_login
 from evaluator.cli.tokens import account, checked, forget_token, keep_token
 
@@ -23,7 +23,7 @@ N_MOVED_SHOWN = 5  # rows whose rank changes; the first show what the others do
 
 
 @click.command(short_help="Save a token on this machine.")
-@url_option
+@site_options
 @json_option
 def login(*, url: str, as_json: bool) -> None:
     """Save a token in the keyring of the operating system, after the server has accepted it.
@@ -83,7 +83,7 @@ def logout(*, url: str, as_json: bool) -> None:
     required=False,
     callback=lambda c, p, value: value and slug(c, p, value),
 )
-@url_option
+@site_options
 @json_option
 def quota(*, split: str | None, url: str, as_json: bool) -> None:
     """Show how many submissions your team has left on each split, or on SPLIT, and when the next slot opens.
@@ -95,15 +95,11 @@ def quota(*, split: str | None, url: str, as_json: bool) -> None:
     """
     with connect(url, with_token=True) as client:
         rows = client.quota()
+    names = [row.split for row in rows]
     if split is not None:
         rows = [row for row in rows if row.split == split]
         if not rows:
-            raise Failure(
-                f"The server names no quota for {split!r}; expected one of its splits.",
-                exit_code=Exit.REFUSED,
-                code="unknown-split",
-                hint="Show all with: tsttc quota",
-            )
+            raise unknown_split(names)
     if as_json:
         echo_json([row.document for row in rows] if split is None else rows[0].document)
         return
@@ -127,7 +123,7 @@ def quota(*, split: str | None, url: str, as_json: bool) -> None:
     help="With --as anonymous: when the method becomes public automatically, such as 2027-03-01T00:00:00Z.",
 )
 @click.option("--yes", is_flag=True, help="Do not ask for confirmation; required without a terminal.")
-@url_option
+@site_options
 @json_option
 def publish(
     *, method: str, visibility: str, reveal_at: str | None, yes: bool, url: str, as_json: bool

@@ -12,7 +12,7 @@ import click
 from evaluator.cli.connection import connect
 from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name, units, width_of
-from evaluator.cli.options import default_option, json_option, sendable, slug, url_option
+from evaluator.cli.options import default_option, json_option, sendable, site_options, slug
 from evaluator.cli.values import authors_or_team, overall_of, texts_of
 from evaluator.metrics.protocol import known_names, primary_of
 from evaluator.tables import layouts
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     metavar="MOMENT",
     help="The board as of a date, or of a time such as 2026-11-20T18:00:00Z.",
 )
-@url_option
+@site_options
 @json_option
 def board(
     *,

@@ -14,8 +14,16 @@ from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.gates import named
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name, units
-from evaluator.cli.options import default_option, json_option, sendable, slug, unit_option, url_option
-from evaluator.cli.reading import TABLE, naming, predictions_of, units_asked
+from evaluator.cli.options import (
+    default_option,
+    json_option,
+    sendable,
+    slug,
+    timeout_option,
+    unit_option,
+    url_option,
+)
+from evaluator.cli.reading import TABLE, labels_of, naming, predictions_of, units_asked
 from evaluator.cli.tokens import has_token
 from evaluator.metrics.protocol import primary_of
 from evaluator.scoring.significance import Difference
@@ -45,6 +53,7 @@ Scores = Mapping[str, float | None]
     help="Ground truth: compare FIRST and SECOND as prediction files, offline.",
 )
 @unit_option
+@timeout_option("Stop waiting for the server's comparison after this time.", default=120.0)
 @url_option
 @json_option
 def compare(
@@ -54,6 +63,7 @@ def compare(
     split: str,
     truth_path: Path | None,
     unit: str | None,
+    timeout_s: float,
     url: str,
     as_json: bool,
 ) -> None:
@@ -73,7 +83,7 @@ def compare(
         return
     if unit is not None:
         raise click.UsageError("--unit needs --truth; a board's edition keeps its own unit.")
-    with connect(url, with_token=has_token(url)) as client:
+    with connect(url, with_token=has_token(url), timeout_s=timeout_s) as client:
         board = client.board(split)
         entries = [named(board, name) for name in (first, second)]
         ids = [entry.method_id for entry in entries if entry.method_id]
@@ -83,7 +93,7 @@ def compare(
                 exit_code=Exit.USAGE,
                 code="bad-comparison",
             )
-        comparison = client.compare(split, ids)
+        comparison = client.compare(split, ids, timeout_s=timeout_s)
     if as_json:
         echo_json(comparison.document)
         return
@@ -144,13 +154,14 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, unit: str | N
             }
         )
         return
-    for line in table((str(first), str(second)), (reports[0].flat(), reports[1].flat()), differences):
+    first_label, second_label = labels_of((first, second))
+    names = first_label, second_label
+    for line in table(names, (reports[0].flat(), reports[1].flat()), differences):
         click.echo(line)
     click.echo("")
     click.echo(units(reports[0].flat()))
     if any(gap.low is not None for gap in differences.values()):
         click.echo(f"95 % confidence intervals and p-values over {taken}")
-    names = str(first), str(second)
     primary = primary_of(reports[0].flat())
     if primary in differences:
         click.echo(printable(sentence(*names, name=primary, difference=differences[primary])))

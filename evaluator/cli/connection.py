@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -13,7 +13,7 @@ import click
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
 from evaluator.cli.layout import printable
-from evaluator.cli.options import TOKEN_VARIABLE
+from evaluator.cli.options import NETWORK_TIMEOUT_S, TOKEN_VARIABLE, network_timeout_s
 from evaluator.cli.tokens import token_for
 
 if TYPE_CHECKING:
@@ -27,12 +27,22 @@ OPTIONS = frozenset(
         *("sort", "at", "m", "visibility"),
     }
 )
-WORDS_OF_403 = frozenset({"token-scope", "token-split", "not-admitted"})
+TOKENS_INSTEAD = {
+    "token-scope": "Create a token with this scope",
+    "token-split": "Create a token for that split, or for all splits,",
+}
+UNKNOWN_SPLIT = "unknown-split"  # the server's code
 
 
 @contextmanager
-def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator[Client]:
-    """Open a client for the site at `url`, with `token` or the stored one; raises Failure."""
+def connect(
+    url: str, *, with_token: bool, token: str | None = None, timeout_s: float | None = None
+) -> Iterator[Client]:
+    """Open a client for the site at `url`, with `token` or the stored one; raises Failure.
+
+    A request and its repetitions end after --timeout. Of a command that waits for a result, `timeout_s` is
+    that option, and its requests end after `NETWORK_TIMEOUT_S` where that is less.
+    """
     # The site must answer as a leaderboard before the token or a file is sent.
     bearer = token or (token_for(url) if with_token else None)
     from evaluator.client.answers import ClientError, Refused  # noqa: PLC0415 -- loads msgspec
@@ -49,7 +59,13 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
     retry_policy = RetryPolicy(n_first_tries=1) if sys.stderr.isatty() else RetryPolicy()
     agent = f"tsttc/{version()}"
     try:
-        with Client(url=url, token=bearer, user_agent=agent, retry_policy=retry_policy) as client:
+        with Client(
+            url=url,
+            token=bearer,
+            timeout_s=min(timeout_s, NETWORK_TIMEOUT_S) if timeout_s else network_timeout_s(),
+            user_agent=agent,
+            retry_policy=retry_policy,
+        ) as client:
             if bearer:
                 client.require_leaderboard()
             try:
@@ -58,23 +74,38 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
                 splits = _splits_instead(client, error)
                 if not splits:
                     raise
-                raise in_words(error, url=url, hint=f"The splits here are {', '.join(splits)}.") from error
+                raise unknown_split(splits, document=error.document) from error
     except ClientError as error:
         raise in_words(error, url=url) from error
 
 
 def _splits_instead(client: Client, error: Refused) -> list[str]:
-    from evaluator.client.answers import ClientError  # noqa: PLC0415 -- loads msgspec
+    # Raises BadAnswer where the refusal is that of another web server.
+    from evaluator.client.answers import BadAnswer, ClientError  # noqa: PLC0415 -- loads msgspec
 
     context = click.get_current_context(silent=True)
     split = context.params.get("split") if context else None
-    if error.status != 404 or not split:
+    if error.status != 404 or (error.code and not split):
         return []
     try:
         known = client.splits()
+    except BadAnswer:
+        raise
     except ClientError:
         return []
-    return [] if split in known else [printable(name) for name in known]
+    return [] if not split or split in known else [printable(name) for name in known]
+
+
+def unknown_split(splits: Sequence[str], *, document: dict[str, Any] | None = None) -> Failure:
+    """The command names a split that is not one of these, in the words of the server about a file for it."""
+    context = click.get_current_context(silent=True)
+    split = context.params.get("split") if context else None
+    return Failure(
+        f"There is no split {split!r}; expected one of {', '.join(splits)}.",
+        exit_code=Exit.USAGE,
+        code=UNKNOWN_SPLIT,
+        document=document,
+    )
 
 
 def version() -> str:
@@ -101,9 +132,14 @@ def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
             code, words = "unreachable", f"Nothing answers at {error.url} ({error.reason})."
         case Unreachable():
             code, words = "cut-off", f"{error.url} gave an incomplete answer ({error.reason})."
-            hint = "Run the command again: the same file never counts twice."
+            context = click.get_current_context(silent=True)
+            is_sending = context is not None and context.info_name == "submit"
+            hint = f"Run the command again{': the same file never counts twice' if is_sending else ''}."
         case BadAnswer():
             code, words = "bad-answer", f"{error.url} did not answer like a leaderboard: {error.content}."
+            site = urlsplit(url)
+            if site.path.strip("/"):
+                hint = f"{hint} The address is that of the site, such as {site.scheme}://{site.netloc}."
         case TimedOut():
             last = f" It was {error.submission.state} last." if error.submission else ""
             exit_code, code, words = Exit.TIMEOUT, "timeout", f"{_sentence(str(error))}{last}"
@@ -164,8 +200,8 @@ def _hint_for(error: Refused, *, url: str) -> str:
     again = f"Try again in {duration(error.retry_after_s)}." if error.retry_after_s else ""
     if error.status == 401:
         return f"Create a token at {url.rstrip('/')}/tokens/, then: tsttc login, or set {TOKEN_VARIABLE}."
-    if error.status == 403 and error.code in WORDS_OF_403:
-        return f"Create a token with this scope at {url.rstrip('/')}/tokens/"
+    if error.status == 403 and error.code in TOKENS_INSTEAD:
+        return f"{TOKENS_INSTEAD[error.code]} at {url.rstrip('/')}/tokens/"
     if error.status == 404:
         return "Check the name, or the id, and --server."
     if error.status == 429:

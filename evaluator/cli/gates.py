@@ -101,16 +101,40 @@ def _conditions(
         raise click.BadParameter(f"{fault}.") from None
 
 
-def judge(conditions: Sequence[Condition], scores: Scores | None, *, decimals: int = 2) -> None:
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What a gate says of a result: whether it fails (None: a value is missing), and why."""
+
+    gate: str
+    is_failing: bool | None
+    reason: str
+
+
+def verdicts_of(
+    conditions: Sequence[Condition], scores: Scores | None, *, decimals: int = 2
+) -> list[Verdict]:
+    """What each condition says of these scores."""
     known: Scores = scores or {}
-    missing = [condition for condition in conditions if condition.holds(known) is None]
-    holding = [condition for condition in conditions if condition.holds(known)]
-    if holding:
-        matches = "; ".join(f"{c.name} is {known[c.name]:.{decimals}f}, which matches {c}" for c in holding)
-        raise Failure(f"The gate fails: {matches}.", exit_code=Exit.GATE, code="gate-failed")
+    verdicts = []
+    for condition in conditions:
+        is_failing, value = condition.holds(known), known.get(condition.name)
+        reason = f"there is no value for {condition.name}"
+        if value is not None:
+            matches = f", which matches {condition}" if is_failing else ""
+            reason = f"{condition.name} is {value:.{decimals}f}{matches}"
+        verdicts.append(Verdict(f"--fail-if {condition}", is_failing, reason))
+    return verdicts
+
+
+def judge(verdicts: Sequence[Verdict]) -> None:
+    """Raise Failure with every gate that fails, or has no value."""
+    failing = [verdict.reason for verdict in verdicts if verdict.is_failing]
+    missing = dict.fromkeys(verdict.reason for verdict in verdicts if verdict.is_failing is None)
+    if failing:
+        words = f"The gate fails: {'; '.join([*failing, *missing])}."
+        raise Failure(words, exit_code=Exit.GATE, code="gate-failed")
     if missing:
-        names = ", ".join(dict.fromkeys(condition.name for condition in missing))
-        raise undecided(f"there is no value for {names}")
+        raise undecided("; ".join(missing))
 
 
 def show_and_judge(
@@ -182,13 +206,12 @@ def rival(client: Client, *, split: str, method: str, own: str) -> BoardEntry | 
     return entry
 
 
-def judge_against(entry: BoardEntry, *, scores: Scores | None, decimals: int = 2) -> None:
-    primary, other = primary_of(entry.scores), primary_value(entry.scores)
-    value = (scores or {}).get(primary)
+def verdict_against(entry: BoardEntry, *, scores: Scores | None, decimals: int = 2) -> Verdict:
+    """Judge whether the score that ranks is worse than the other method's."""
+    name, primary, other = printable(entry.method), primary_of(entry.scores), primary_value(entry.scores)
+    gate, value = f"--fail-if-worse-than {name}", (scores or {}).get(primary)
     if value is None or other is None:
-        raise undecided(f"there is no value for {primary}")
-    if value > other:
-        name = printable(entry.method)
-        symbol = metric_of(primary).symbol
-        words = f"{symbol} is {value:.{decimals}f}, and {name} has {other:.{entry.decimals}f}"
-        raise Failure(f"The gate fails: {words}.", exit_code=Exit.GATE, code="gate-failed")
+        return Verdict(gate, None, f"there is no value for {primary}")
+    symbol = metric_of(primary).symbol
+    reason = f"{symbol} is {value:.{decimals}f}, and {name} has {other:.{entry.decimals}f}"
+    return Verdict(gate, value > other, reason)

@@ -11,7 +11,7 @@ import click
 
 from evaluator.cli.connection import connect
 from evaluator.cli.failures import echo_json
-from evaluator.cli.options import json_option, output_option, predictions_argument, slug, url_option
+from evaluator.cli.options import json_option, output_option, predictions_argument, site_options, slug
 from evaluator.cli.reading import FOLDER, TABLE, name_of, naming, predictions_of, write_bytes
 from evaluator.cli.warnings_in_words import (
     echo_warnings,
@@ -107,7 +107,7 @@ def _sequences(manifest_path: Path | None, annotations: Path | None) -> tuple[Ma
 )
 @click.option("--edition", type=int, metavar="N", help="With --split: of a former edition, by its number.")
 @output_option("the CSV table")
-@url_option
+@site_options
 @json_option
 def manifest(
     *,

@@ -15,6 +15,10 @@ from evaluator.cli.paths import server_of_login
 from evaluator.units import KINDS, MIN_DAYS
 
 DEFAULT_URL = "http://127.0.0.1:8000"
+NETWORK_TIMEOUT_S: Final = 15.0
+"""How long a request and its repetitions may take."""
+_TIMEOUT: Final = "tsttc.timeout_s"
+_SECONDS: Final = click.FloatRange(min=0, min_open=True)
 TOKEN_VARIABLE = "TSTTC_TOKEN"  # noqa: S105 -- the name of a variable, not a token
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -42,6 +46,31 @@ def output_option(what: str) -> Callable[[Command], Command]:
     )
 
 
+def site_options(command: Command) -> Command:
+    """--server, and --timeout for the requests of a command that waits for nothing else."""
+
+    def keep(context: click.Context, _parameter: click.Parameter, value: float) -> None:
+        context.meta[_TIMEOUT] = value
+
+    option = default_option(
+        "--timeout",
+        type=_SECONDS,
+        metavar="SECONDS",
+        default=NETWORK_TIMEOUT_S,
+        expose_value=False,
+        callback=keep,
+        help="Stop asking the server after this time.",
+    )
+    return url_option(option(command))
+
+
+def network_timeout_s() -> float:
+    """The --timeout of the present command, by `site_options`."""
+    context = click.get_current_context(silent=True)
+    timeout_s: float = context.meta.get(_TIMEOUT, NETWORK_TIMEOUT_S) if context else NETWORK_TIMEOUT_S
+    return timeout_s
+
+
 def url_option(command: Command) -> Command:
     return click.option(
         "--server",
@@ -67,15 +96,11 @@ def unit_option(command: Command) -> Command:
     )(command)
 
 
-def timeout_option(command: Command) -> Command:
+def timeout_option(help_text: str, *, default: float) -> Callable[[Command], Command]:
+    """--timeout: how long to wait for a result."""
     return default_option(
-        "--timeout",
-        "timeout_s",
-        type=click.FloatRange(min=0, min_open=True),
-        metavar="SECONDS",
-        default=900.0,
-        help="Stop waiting after this time; the evaluation continues.",
-    )(command)
+        "--timeout", "timeout_s", type=_SECONDS, metavar="SECONDS", default=default, help=help_text
+    )
 
 
 def slug(_context: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:

@@ -14,7 +14,7 @@ from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name
-from evaluator.cli.options import default_option, json_option, output_option, sendable, slug, url_option
+from evaluator.cli.options import default_option, json_option, output_option, sendable, site_options, slug
 from evaluator.cli.reading import write_bytes
 from evaluator.cli.values import state_in_words
 from evaluator.metrics.protocol import metric_of, primary_of, primary_value
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Show whose token this is, and what it may do.")
-@url_option
+@site_options
 @json_option
 def whoami(*, url: str, as_json: bool) -> None:
     """Show the team of your token, the token's name, what it may do and when it ends.
@@ -47,7 +47,7 @@ def whoami(*, url: str, as_json: bool) -> None:
 
 
 @click.command(short_help="List the methods of your team.")
-@url_option
+@site_options
 @json_option
 def methods(*, url: str, as_json: bool) -> None:
     """List the methods of your team: id, name and who sees them.
@@ -87,7 +87,7 @@ def methods(*, url: str, as_json: bool) -> None:
 @default_option(
     "-n", "--limit", type=click.IntRange(min=1), default=20, help="Largest number of submissions."
 )
-@url_option
+@site_options
 @json_option
 def list_submissions(*, split: str | None, method: str | None, limit: int, url: str, as_json: bool) -> None:
     """List the submissions of your team: id, time, split, method, state and the score that ranks.
@@ -141,7 +141,7 @@ def _table(submissions: Sequence[Submission]) -> list[str]:
 @click.command(short_help="Withdraw or cancel a submission of your team.")
 @click.argument("submission_id", metavar="ID", callback=slug)
 @click.option("--yes", is_flag=True, help="Do not ask for confirmation; required without a terminal.")
-@url_option
+@site_options
 @json_option
 def withdraw(*, submission_id: str, yes: bool, url: str, as_json: bool) -> None:
     """Withdraw submission ID. This cannot be undone.
@@ -176,7 +176,7 @@ def _confirm(words: str) -> None:
 @click.command(short_help="Get back a prediction file that your team submitted.")
 @click.argument("submission_id", metavar="ID", callback=slug)
 @output_option("it")
-@url_option
+@site_options
 def download(*, submission_id: str, output: Path | None, url: str) -> None:
     """Get the file of submission ID, byte by byte as your team submitted it.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -40,6 +40,14 @@ def units_asked(truth: GroundTruth, unit: str | None) -> Units:
 
 def name_of(path: Path) -> str:
     return "standard input" if str(path) == "-" else str(path)
+
+
+def labels_of(paths: Sequence[Path]) -> list[str]:
+    """What a table calls these files: their names, or their paths where two have the same name."""
+    names = [path.name for path in paths]
+    return [
+        path.name if names.count(path.name) == 1 and path.name != "-" else name_of(path) for path in paths
+    ]
 
 
 def bytes_of(path: Path) -> bytes:

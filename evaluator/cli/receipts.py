@@ -13,7 +13,7 @@ from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json, rejected
 from evaluator.cli.layout import printable, score_table, units
-from evaluator.cli.options import json_option, output_option, slug, url_option
+from evaluator.cli.options import json_option, output_option, site_options, slug
 from evaluator.cli.reading import bytes_of, write_bytes
 from evaluator.problems import Rejected
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @click.command(short_help="Get the signed receipt of a scored submission.")
 @click.argument("submission_id", metavar="ID", callback=slug)
 @output_option("it")
-@url_option
+@site_options
 def receipt(*, submission_id: str, output: Path | None, url: str) -> None:
     """Get the signed receipt of submission ID: what it scored, in which edition, by which file, and when.
 
@@ -56,7 +56,7 @@ def receipt(*, submission_id: str, output: Path | None, url: str) -> None:
     metavar="FILE",
     help="A saved copy of the site's keys (default: fetched from --server).",
 )
-@url_option
+@site_options
 @json_option
 def verify(*, receipt_path: Path, keys_path: Path | None, url: str, as_json: bool) -> None:
     """Check that the leaderboard signed RECEIPT, a file or - for standard input, and print what it says.

@@ -16,7 +16,7 @@ from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, result_in_w
 from evaluator.cli.options import default_option, json_option, unit_option
 from evaluator.cli.reading import (
     TABLE,
-    name_of,
+    labels_of,
     naming,
     predictions_of,
     units_asked,
@@ -138,8 +138,9 @@ def score(
     if per_sequence is not None:
         write_bytes(per_sequence, _per_sequence(scored_files), option="--per-sequence")
     if taken and not as_json and not any(any(row.intervals.values()) for row in rows):
+        groups = f"No {by} has a confidence interval" if by else "There are no confidence intervals"
         few = f"one needs 8 {in_words(taken.kind)} of equal size, or more of unequal size"
-        click.echo(f"There are no confidence intervals: {few}.", err=True)
+        click.echo(f"{groups}: {few}; found {taken} in all.", err=True)
     tabular = by is not None or with_intervals or len(scored_files) > 1
     gates.show_and_judge(
         _document(scored_files, rows if tabular else [], by=by, taken=taken),
@@ -230,16 +231,11 @@ def _scored(paths: Sequence[Path], truth: GroundTruth, *, protocol: str) -> Iter
 
     if len(set(paths)) < len(paths):
         raise click.UsageError("A file is named twice; expected each once.")
-    names = [path.name for path in paths]
-    for path in paths:
+    for path, label in zip(paths, labels_of(paths), strict=True):
         with naming(path):
             read = read_predictions(predictions_of(path), manifest=truth.manifest)
             report = evaluate(read, truth, protocol=protocol, keep_sequences=True)
-        yield _Scored(
-            path.name if names.count(path.name) == 1 and path.name != "-" else name_of(path),
-            report,
-            warnings_with_truth(read, truth),
-        )
+        yield _Scored(label, report, warnings_with_truth(read, truth))
 
 
 def _rows(scored: _Scored, *, by: str | None, taken: Units | None) -> Iterator[ResultRow]:
@@ -380,7 +376,7 @@ def _per_sequence(scored_files: Sequence[_Scored]) -> bytes:
 def _judge(conditions: list[gates.Condition], scored_files: Sequence[_Scored]) -> None:
     for one in scored_files:
         try:
-            gates.judge(conditions, one.report.flat())
+            gates.judge(gates.verdicts_of(conditions, one.report.flat()))
         except Failure as failure:
             if len(scored_files) > 1:
                 failure.message = f"{printable(one.name)}: {failure.message}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,12 +26,13 @@ from evaluator.cli.options import (
     url_option,
 )
 from evaluator.cli.reading import name_of, predictions_of
+from evaluator.cli.summaries import summarised
 from evaluator.cli.values import in_short, state_in_words
 from evaluator.cli.warnings_in_words import echo_warnings
 from evaluator.problems import Rejected, n_problems_in_words
 
 if TYPE_CHECKING:
-    from evaluator.client.answers import Submission
+    from evaluator.client.answers import BoardEntry, Submission
     from evaluator.client.api import Client
 
 
@@ -55,7 +56,7 @@ if TYPE_CHECKING:
 @click.option("--note", callback=sendable, help="A note for your team.")
 @click.option("--commit", callback=sendable, help="The commit that produced the file.")
 @click.option("--wait", is_flag=True, help="Wait for the scores.")
-@timeout_option
+@timeout_option("Stop waiting after this time; the evaluation continues.", default=900.0)
 @gates.fail_if_option
 @click.option(
     "--fail-if-worse-than",
@@ -65,6 +66,13 @@ if TYPE_CHECKING:
 )
 @click.option("--yes", is_flag=True, help="Do not ask before the results of a public method go public.")
 @click.option("--no-check", is_flag=True, help="Submit without checking the file first.")
+@click.option(
+    "--summary",
+    "summary_path",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Append the result or the failure to this file as Markdown, such as $GITHUB_STEP_SUMMARY.",
+)
 @url_option
 @json_option
 def submit(
@@ -80,6 +88,7 @@ def submit(
     no_check: bool,
     url: str,
     as_json: bool,
+    summary_path: Path | None,
     **details: str | None,
 ) -> None:
     """Submit PREDICTIONS, a prediction file or - for standard input, to the leaderboard.
@@ -95,8 +104,11 @@ def submit(
       tsttc submit predictions.json --split val --method "Foo++" --fail-if "mid > 15.0 or rte > 13"
       tsttc submit predictions.json --split val --method "Foo++" --fail-if-worse-than published:deep-scale
     """
-    data = predictions_of(predictions)
-    with connect(url, with_token=True) as client:
+    with (
+        summarised(summary_path, named=f"{method} on {split}") as summary,
+        connect(url, with_token=True, timeout_s=timeout_s) as client,
+    ):
+        data = predictions_of(predictions)
         warned = frozenset[str]()
         if not no_check:
             warned = _require_good(client, data, split=split, path=predictions)
@@ -114,20 +126,16 @@ def submit(
             method=method,
             details={field: value for field, value in details.items() if value},
         )
+        summary.submission, summary.address = submission, urljoin(url, submission.url or "")
         is_waiting = wait or bool(fail_if) or bool(worse_than)
         if is_waiting or not as_json:
             _announce(submission, site=url, err=as_json)
         if submission.notice != notice:  # a token that may only submit learns it now
             _warn(submission.notice, err=as_json)
         if is_waiting and not submission.is_final:
-            submission = _followed(client, submission.id, timeout_s=timeout_s)
-
-        def judge() -> None:
-            gates.judge(fail_if, submission.scores, decimals=submission.decimals)
-            if rival is not None:
-                gates.judge_against(rival, scores=submission.scores, decimals=submission.decimals)
-
-        conclude(submission, as_json=as_json, judge=judge, warned=warned)
+            submission = summary.submission = _followed(client, submission.id, timeout_s=timeout_s)
+        summary.verdicts = _verdicts(submission, fail_if, rival)
+        conclude(submission, as_json=as_json, verdicts=summary.verdicts, warned=warned)
         if submission.is_new and submission.visibility == "PRIVATE" and not as_json:
             name = printable(submission.method)
             click.echo(
@@ -136,10 +144,21 @@ def submit(
             )
 
 
+def _verdicts(
+    submission: Submission, conditions: Sequence[gates.Condition], rival: BoardEntry | None
+) -> list[gates.Verdict]:
+    """What every gate says of a submission; nothing of one that has no scores yet or never will."""
+    scores, decimals = submission.scores, submission.decimals
+    verdicts = gates.verdicts_of(conditions, scores, decimals=decimals)
+    if rival is not None:
+        verdicts.append(gates.verdict_against(rival, scores=scores, decimals=decimals))
+    return verdicts
+
+
 @click.command(short_help="Show the state, the scores or the problems of a submission.")
 @click.argument("submission_id", metavar="[ID]", callback=slug, required=False)
 @click.option("--watch", is_flag=True, help="Wait until the state is final.")
-@timeout_option
+@timeout_option("Stop waiting after this time; the evaluation continues.", default=900.0)
 @gates.fail_if_option
 @url_option
 @json_option
@@ -162,7 +181,7 @@ def status(
       tsttc status 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11
       tsttc status 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11 --watch --fail-if "mid > 15.0"
     """
-    with connect(url, with_token=True) as client:
+    with connect(url, with_token=True, timeout_s=timeout_s) as client:
         submission_id = submission_id or _latest(client)
         submission = (
             _followed(client, submission_id, timeout_s=timeout_s)
@@ -172,7 +191,7 @@ def status(
     conclude(
         submission,
         as_json=as_json,
-        judge=lambda: gates.judge(fail_if, submission.scores, decimals=submission.decimals),
+        verdicts=_verdicts(submission, fail_if, None),
     )
 
 
@@ -260,7 +279,7 @@ def conclude(
     submission: Submission,
     *,
     as_json: bool,
-    judge: Callable[[], None],
+    verdicts: Sequence[gates.Verdict],
     warned: frozenset[str] = frozenset(),
 ) -> None:
     """Print a submission; raises Failure if it ended without scores or a gate fails."""
@@ -286,7 +305,7 @@ def conclude(
             gates.show_and_judge(
                 submission.document,
                 show=partial(_show, submission, named, warned),
-                judge=judge,
+                judge=lambda: gates.judge(verdicts),
                 as_json=as_json,
             )
             return

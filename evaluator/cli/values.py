@@ -38,13 +38,19 @@ def state_in_words(submission: Submission) -> str:
     return words
 
 
+def rank_in_words(submission: Submission) -> str:
+    """The rank of a scored submission with its rank range; empty if it has none."""
+    if submission.rank is None:
+        return ""
+    interval = submission.intervals.get(primary_of(submission.scores or {}))
+    low, high = (interval.rank_low, interval.rank_high) if interval else (None, None)
+    would_be = "if published: " if submission.visibility == "PRIVATE" else ""
+    return f"{would_be}rank {layouts.rank_text(submission.rank, low=low, high=high)}"
+
+
 def in_short(submission: Submission) -> Iterator[str]:
-    if submission.rank is not None:
-        interval = submission.intervals.get(primary_of(submission.scores or {}))
-        low, high = (interval.rank_low, interval.rank_high) if interval else (None, None)
-        would_be = "if published: " if submission.visibility == "PRIVATE" else ""
-        rank = layouts.rank_text(submission.rank, low=low, high=high)
-        yield f"{would_be}rank {rank}"
+    if rank := rank_in_words(submission):
+        yield rank
     errors = [
         text
         for name in overall_of(submission.scores or {})

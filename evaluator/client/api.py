@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Self, TypeVar
 from urllib.parse import quote, urlsplit
+from urllib.request import getproxies, proxy_bypass
 
 import httpx
 
@@ -57,13 +58,26 @@ def _certificates(url: str) -> ssl.SSLContext | bool:
     return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT) if urlsplit(url).scheme == "http" else True
 
 
+def _proxy_of(url: str) -> str:
+    """Host and port of the proxy that the environment names for this address; empty for none."""
+    site = urlsplit(url)
+    if site.hostname in LOOPBACK_HOSTS or proxy_bypass(site.netloc):
+        return ""
+    proxies = getproxies()
+    address = proxies.get(site.scheme) or proxies.get("all") or ""
+    return address.rpartition("//")[2].rpartition("@")[2].rstrip("/")  # without a password
+
+
 @dataclass(kw_only=True)
 class Client:
-    """A connection to one leaderboard; `timeout_s` limits each wait for the network."""
+    """A connection to one leaderboard. `timeout_s` bounds a request together with its repetitions.
+
+    What the server asks to wait for in `Retry-After` is not counted.
+    """
 
     url: str
     token: str | None = field(default=None, repr=False)
-    timeout_s: float = 30.0
+    timeout_s: float = 15.0
     retry_policy: RetryPolicy = field(default_factory=RetryPolicy)
     user_agent: str = "tsttc"
     sleep: Callable[[float], None] = time.sleep
@@ -311,11 +325,16 @@ class Client:
     def _address(self, *path: str) -> str:
         return "/".join([self.url, "api/v1", *(quote(part, safe="") for part in path)])
 
-    def _checked(self, send: Callable[[], httpx.Response]) -> httpx.Response:
+    def _checked(
+        self, send: Callable[[], httpx.Response], *, timeout_s: float | None = None
+    ) -> httpx.Response:
+        self._http.timeout = timeout_s or self.timeout_s
         try:
             response = checked(send, url=self.url)
         except Unreachable as fault:
             self._was_answered = self._was_answered or fault.was_connected
+            if not fault.was_connected and (proxy := _proxy_of(self.url)):
+                fault.reason = f"through the proxy {proxy}, which the environment names: {fault.reason}"
             raise
         except Refused:
             self._was_answered = True
@@ -324,17 +343,18 @@ class Client:
         return response
 
     def _retry(self, send: Callable[[], httpx.Response]) -> httpx.Response:
-        n_failed = 0
+        n_failed, until_s = 0, self.monotonic_s() + self.timeout_s
         while True:
             try:
-                return self._checked(send)
+                return self._checked(send, timeout_s=until_s - self.monotonic_s())
             except (Unreachable, Refused) as fault:
                 n_failed += 1
                 n_tries = self.retry_policy.n_tries if self._was_answered else self.retry_policy.n_first_tries
                 is_lasting = isinstance(fault, Refused) and not self.retry_policy.may_pass(fault)
-                if n_failed >= n_tries or is_lasting:
+                after_s = fault.retry_after_s if isinstance(fault, Refused) else None
+                delay_s = self.retry_policy.delay_s(n_failed=n_failed, retry_after_s=after_s, rng=self.rng)
+                until_s += after_s or 0.0
+                is_late = self.monotonic_s() + delay_s >= until_s
+                if n_failed >= n_tries or is_lasting or is_late:
                     raise
-                delay_after_s = fault.retry_after_s if isinstance(fault, Refused) else None
-            self.sleep(
-                self.retry_policy.delay_s(n_failed=n_failed, retry_after_s=delay_after_s, rng=self.rng)
-            )
+            self.sleep(delay_s)

@@ -23,11 +23,11 @@ class RetryPolicy:
     """The limits of retrying: a quarter of a minute, enough for a restart of the server."""
 
     n_tries: int = 9
-    n_first_tries: int = 8  # where nothing has ever answered
+    n_first_tries: int = 9  # where nothing has ever answered
     first_delay_s: float = 0.25
     longest_delay_s: float = 10.0
     longest_retry_after_s: float = 60.0  # who asks for more than this gets their answer reported instead
-    factor: float = 1.6
+    factor: float = 1.5
     jitter: float = 0.2
 
     def delay_s(self, *, n_failed: int, retry_after_s: float | None, rng: random.Random) -> float:

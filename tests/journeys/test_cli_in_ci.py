@@ -113,7 +113,7 @@ def test_what_is_one_s_own_is_listed_taken_back_and_withdrawn(job: Job) -> None:
     folder = write_folder(job.home / "folder", {"a.pkl": [camera({7: list(range(6))})]})
     assert tsttc("truth", folder, "-o", table).stdout == f"{table}: 1 sequence of 1 recording.\n"
     nowhere = tsttc("manifest", "--split", "tset")
-    assert (nowhere.returncode, "The splits here are " in nowhere.stderr) == (8, True)
+    assert (nowhere.returncode, "There is no split 'tset'; " in nowhere.stderr) == (2, True)
 
     shown = tsttc("publish", "Job", "--yes")
     assert shown.returncode == 0, shown.stderr

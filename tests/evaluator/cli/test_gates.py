@@ -140,6 +140,14 @@ def test_file_is_compared_with_a_method_of_the_board(
         assert "The gate fails: MiD is 14.01, and Old has 14.00." in result.stderr
 
 
+def test_every_gate_that_fails_is_named(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put(BOARD, board(entry("Old", 13.0, method_id=OTHER)))
+    scored(site, mid=14.0)
+    result = submit(tsttc, "--fail-if", "mid > 5", "--fail-if-worse-than", "Old")
+    words = "The gate fails: mid is 14.00, which matches mid > 5; MiD is 14.00, and Old has 13.00."
+    assert (result.exit_code, words in result.stderr) == (6, True)
+
+
 def test_file_may_be_compared_with_a_row_of_a_paper(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(BOARD, board(entry("Deep Scale", 14.4, method_id=None, kind="published")))
     scored(site, mid=15.0)

@@ -122,7 +122,10 @@ def test_truth_of_a_folder_becomes_a_table_with_its_objects(tsttc: Tsttc, tmp_pa
 def test_a_split_that_is_not_there_is_answered_with_those_that_are(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put("GET /api/v1/splits/trial/board", Reply(problem("Nothing here."), status=404))
     refused = tsttc("board", "trial")
-    assert (refused.exit_code, refused.stderr) == (8, "Error: Nothing here.\nThe splits here are val.\n")
+    assert (refused.exit_code, refused.stderr) == (
+        2,
+        "Error: There is no split 'trial'; expected one of val.\n",
+    )
 
 
 def test_a_withdrawn_submission_says_so(tsttc: Tsttc, site: RecordedSite) -> None:
