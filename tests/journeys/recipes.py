@@ -1,5 +1,6 @@
 """The recipes for CI as a runner reads them: their jobs' shell steps, in order."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,8 @@ import yaml
 from tests.journeys.production import REPOSITORY
 
 FOLDER = REPOSITORY / "examples" / "ci"
-INSTALL = 'python -m pip install "tsttc @ $TSTTC_SOURCE"'
+ACTION = "./.github/actions/tsttc-submit"
+PIN = re.compile(r"[\w-]+/[\w-]+@[0-9a-f]{40}")
 
 
 @dataclass(frozen=True)
@@ -22,10 +24,29 @@ class Recipe:
 
 
 def github() -> Recipe:
-    document = _read("github-actions.yml")
-    (job,) = document["jobs"].values()
-    runs = [step["run"] for step in job["steps"] if "run" in step]
-    return _recipe(job["env"], runs)
+    """The workflow, with the steps of the action in the place where it is used."""
+    runs, environment = list[str](), dict[str, str]()
+    for step in github_steps():
+        if step.get("uses") != ACTION:
+            runs += [step["run"]] if "run" in step else []
+            continue
+        action = _read("github/actions/tsttc-submit/action.yml")
+        defaults = {name: each.get("default") for name, each in action["inputs"].items()}
+        assert step["with"].keys() <= defaults.keys()
+        for one in action["runs"]["steps"]:
+            assert "${{" not in one["run"], "an input in a script would be run"
+            runs.append(one["run"])
+            environment |= {
+                name: _filled(expression, defaults | step["with"]) for name, expression in one["env"].items()
+            }
+    return _recipe(environment, runs)
+
+
+def github_steps() -> list[dict[str, Any]]:
+    """The steps of the workflow."""
+    (job,) = _read("github/workflows/leaderboard.yml")["jobs"].values()
+    steps: list[dict[str, Any]] = job["steps"]
+    return steps
 
 
 def gitlab() -> Recipe:
@@ -33,8 +54,12 @@ def gitlab() -> Recipe:
     return _recipe(job["variables"], [*job["before_script"], *job["script"], *job["after_script"]])
 
 
+def _filled(expression: str, inputs: dict[str, Any]) -> str:
+    return re.sub(r"\$\{\{ inputs\.([\w-]+) \}\}", lambda match: str(inputs[match[1]]), expression)
+
+
 def _recipe(environment: dict[str, Any], runs: list[str]) -> Recipe:
-    steps = [run for run in runs if run.strip() != INSTALL]
+    steps = [run for run in runs if '"tsttc @ $TSTTC_SOURCE"' not in run]
     return Recipe(
         environment={name: str(value) for name, value in environment.items()},
         steps=steps,

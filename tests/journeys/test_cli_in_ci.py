@@ -157,8 +157,8 @@ def test_worse_method_fails_the_gate_and_the_better_one_is_shown(job: Job) -> No
 )
 def test_recipe_runs_as_it_stands(job: Job, recipe: recipes.Recipe, factor: float, exit_code: int) -> None:
     """But for the installation, and with this site's address, split and token."""
-    programs, work = job.home / "bin", job.home / "work"
-    programs.mkdir()
+    programs, work = job.home / "tsttc" / "bin", job.home / "work"
+    programs.mkdir(parents=True)
     work.mkdir()
     for path, text in {
         programs / "tsttc": f'exec {sys.executable} -m evaluator "$@"',
@@ -169,13 +169,25 @@ def test_recipe_runs_as_it_stands(job: Job, recipe: recipes.Recipe, factor: floa
     surroundings = recipe.environment | environment(job.site.url, job.token, home=job.home)
     surroundings |= {"PATH": f"{programs}:{os.environ['PATH']}", "SPLIT": "test"}
     surroundings |= {"GITHUB_SHA": "c0ffee", "CI_COMMIT_SHA": "c0ffee", "GITHUB_STEP_SUMMARY": "summary.md"}
+    surroundings |= {"RUNNER_TEMP": str(job.home)}
     codes = [
         subprocess.run(
             ["bash", "-e", "-o", "pipefail", "-c", step], cwd=work, env=surroundings, check=False
         ).returncode
         for step in recipe.steps
     ]
-    assert codes == [0, exit_code, 0]
+    assert codes[:2] == [0, exit_code]
+    assert not any(codes[2:])
     result = json.loads((work / "result.json").read_text())
     assert (result["state"], result["commit"]) == ("SCORED", "c0ffee")
     assert recipe.n_installing == 1
+    summary = (work / "summary.md").read_text()
+    assert summary.startswith("### Foo++ on test: SCORED\n")
+    assert "`--fail-if mid > 15` " in summary
+    assert ("**The gate fails: " in summary) is (exit_code == 6)
+
+
+def test_actions_of_others_are_named_by_commit() -> None:
+    foreign = [step["uses"] for step in recipes.github_steps() if step.get("uses", "./")[:2] != "./"]
+    assert foreign
+    assert all(recipes.PIN.fullmatch(use) for use in foreign)
