@@ -11,7 +11,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from evaluator.client.answers import ClientError
     from evaluator.client.api import Client
+    from evaluator.frames import manifest_frame, predictions_from_frame
     from evaluator.metrics.protocol import PROTOCOLS, SCORE_NAMES, TTC_RANGES, Protocol, get_protocol
     from evaluator.metrics.scale import convert_rate, fps_of_gap, scale_ratio_to_ttc, ttc_to_scale_ratio
     from evaluator.predictions.conversion import convert
@@ -27,10 +29,14 @@ if TYPE_CHECKING:
     from evaluator.truth.csv_tables import Table
     from evaluator.truth.ground_truth import GroundTruth, Manifest, read_manifest, read_truth
     from evaluator.truth.numbering import read_numbering
+
+    __version__: str
 else:
     # Each name is imported when it is first asked for: `tsttc --help` then answers without loading numpy.
     _HOMES = {
+        "client.answers": ("ClientError",),
         "client.api": ("Client",),
+        "frames": ("manifest_frame", "predictions_from_frame"),
         "metrics.scale": ("convert_rate", "fps_of_gap", "scale_ratio_to_ttc", "ttc_to_scale_ratio"),
         "predictions.conversion": ("convert",),
         "truth.csv_tables": ("Table",),
@@ -50,10 +56,21 @@ else:
     _HOME_OF = {name: f"evaluator.{module}" for module, names in _HOMES.items() for name in names}
 
     def __getattr__(name: str) -> object:
-        if name not in _HOME_OF:
+        if name == "__version__":
+            value: object = _version()
+        elif name in _HOME_OF:
+            value = getattr(import_module(_HOME_OF[name]), name)
+        else:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        value = globals()[name] = getattr(import_module(_HOME_OF[name]), name)
+        globals()[name] = value
         return value
+
+    def _version() -> str:
+        metadata = import_module("importlib.metadata")  # costs more time than the rest of --help
+        try:
+            return str(metadata.version("tsttc"))
+        except metadata.PackageNotFoundError:
+            return "0"
 
 
 __all__ = [
@@ -62,6 +79,7 @@ __all__ = [
     "SCORE_NAMES",
     "TTC_RANGES",
     "Client",
+    "ClientError",
     "Difference",
     "GroundTruth",
     "Manifest",
@@ -72,6 +90,7 @@ __all__ = [
     "Rejected",
     "Report",
     "Table",
+    "__version__",
     "compare_predictions",
     "confidence_intervals",
     "convert",
@@ -80,6 +99,8 @@ __all__ = [
     "format_rounded",
     "fps_of_gap",
     "get_protocol",
+    "manifest_frame",
+    "predictions_from_frame",
     "read_manifest",
     "read_numbering",
     "read_predictions",

@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
-from typing import Final
+from typing import Final, Literal
 
 from evaluator.counting import counted
 
@@ -20,6 +20,7 @@ RECORDING: Final = "recording"
 DAY: Final = "day"
 GIVEN: Final = "given"
 KINDS: Final = (RECORDING, DAY, GIVEN)
+UnitKind = Literal["recording", "day", "given"]
 MIN_DAYS: Final = 30
 """With fewer days the recording is the unit: a day each would leave too few units for the ranges to hold."""
 
@@ -63,7 +64,7 @@ def day_of(recording: str) -> date | None:
 class Units:
     """The units of recordings: their `names`, and the unit's `index` of every recording."""
 
-    kind: str
+    kind: UnitKind
     names: tuple[str, ...]
     index: tuple[int, ...]
 
@@ -80,11 +81,11 @@ def units_of(recordings: Sequence[str], *, given: Mapping[str, str], kind: str |
     if kind is None:
         kind = GIVEN if given else DAY if days and len(set(days)) >= MIN_DAYS else RECORDING
     if kind == RECORDING:
-        return Units(kind, tuple(recordings), tuple(range(len(recordings))))
+        return Units(RECORDING, tuple(recordings), tuple(range(len(recordings))))
     if kind == GIVEN and given:
-        return _grouped(kind, [given[name] for name in recordings])
+        return _grouped(GIVEN, [given[name] for name in recordings])
     if kind == DAY and days:
-        return _grouped(kind, days)
+        return _grouped(DAY, days)
     raise ValueError(
         "The ground truth has no column unit; expected one to take its units."
         if kind == GIVEN
@@ -100,7 +101,7 @@ def _days(recordings: Sequence[str]) -> list[str] | None:
     return days if len(days) == len(recordings) else None
 
 
-def _grouped(kind: str, labels: Sequence[str]) -> Units:
+def _grouped(kind: UnitKind, labels: Sequence[str]) -> Units:
     names = tuple(sorted(set(labels)))
     position = {name: i for i, name in enumerate(names)}
     return Units(kind, names, tuple(position[label] for label in labels))

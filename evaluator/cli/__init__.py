@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import click
 
+import evaluator
 from evaluator.cli import plugins
-from evaluator.cli.connection import version
 from evaluator.cli.exits import MEANINGS, Exit
 from evaluator.cli.failures import Failure
 
@@ -105,7 +105,7 @@ def own_commands() -> dict[str, click.Command]:
 
 def _show_version(context: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
     if wanted:
-        click.echo(f"tsttc {version()}")
+        click.echo(f"tsttc {evaluator.__version__}")
         context.exit()
 
 

@@ -10,6 +10,7 @@ from urllib.parse import urlsplit
 
 import click
 
+import evaluator
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
 from evaluator.cli.layout import printable
@@ -57,7 +58,7 @@ def connect(
         click.echo(f"Warning: the token goes to {url} unencrypted; use https where you can.", err=True)
     # A job may begin before its server has; a person who mistyped an address wants to hear of it at once.
     retry_policy = RetryPolicy(n_first_tries=1) if sys.stderr.isatty() else RetryPolicy()
-    agent = f"tsttc/{version()}"
+    agent = f"tsttc/{evaluator.__version__}"
     try:
         with Client(
             url=url,
@@ -106,15 +107,6 @@ def unknown_split(splits: Sequence[str], *, document: dict[str, Any] | None = No
         code=UNKNOWN_SPLIT,
         document=document,
     )
-
-
-def version() -> str:
-    import importlib.metadata  # noqa: PLC0415 -- costs more time than the rest of --help
-
-    try:
-        return importlib.metadata.version("tsttc")
-    except importlib.metadata.PackageNotFoundError:
-        return "0"
 
 
 def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:

@@ -30,7 +30,10 @@ from evaluator.units import in_words
 
 if TYPE_CHECKING:
     from evaluator import GroundTruth, Report
+    from evaluator.metrics.protocol import ProtocolName
     from evaluator.problems import FileWarning
+    from evaluator.scoring.breakdown import GroupName
+    from evaluator.scoring.report import PlotKind
     from evaluator.units import Units
 
 GROUPS: Final = ("recording", "camera", "range", "occlusion", "lane", "box-size")
@@ -101,8 +104,8 @@ def score(
     *,
     predictions: tuple[Path, ...],
     truth_path: Path,
-    protocol: str,
-    by: str | None,
+    protocol: ProtocolName,
+    by: GroupName | None,
     with_intervals: bool,
     unit: str | None,
     per_sequence: Path | None,
@@ -173,8 +176,8 @@ def plot(
     *,
     predictions: tuple[Path, ...],
     truth_path: Path,
-    protocol: str,
-    kind: str,
+    protocol: ProtocolName,
+    kind: PlotKind,
     output: Path,
     as_json: bool,
 ) -> None:
@@ -225,7 +228,7 @@ def _truth(path: Path) -> GroundTruth:
         return read_truth(path)
 
 
-def _scored(paths: Sequence[Path], truth: GroundTruth, *, protocol: str) -> Iterator[_Scored]:
+def _scored(paths: Sequence[Path], truth: GroundTruth, *, protocol: ProtocolName) -> Iterator[_Scored]:
     from evaluator import evaluate, read_predictions  # noqa: PLC0415 -- numpy, as above
     from evaluator.predictions.plausibility import warnings_with_truth  # noqa: PLC0415 -- numpy, as above
 
@@ -238,7 +241,7 @@ def _scored(paths: Sequence[Path], truth: GroundTruth, *, protocol: str) -> Iter
         yield _Scored(label, report, warnings_with_truth(read, truth))
 
 
-def _rows(scored: _Scored, *, by: str | None, taken: Units | None) -> Iterator[ResultRow]:
+def _rows(scored: _Scored, *, by: GroupName | None, taken: Units | None) -> Iterator[ResultRow]:
     report, drawn = scored.report, "" if taken is None else str(taken)
     if by is not None:
         try:

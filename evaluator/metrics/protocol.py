@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 from evaluator.metrics.registry import MID, RTE, Metric
 
@@ -232,6 +232,9 @@ PROTOCOLS: Final[dict[str, Protocol]] = registered(
     Protocol(name="tsttc-1", limit_s=20.0, near_zero_s=(-0.15, 0.05)),
     Protocol(name="toolkit", limit_s=20.0, near_zero_s=None),
 )
+
+ProtocolName = Literal["tsttc-1", "toolkit"]
+"""For a type checker and an editor; `get_protocol` takes every name of `PROTOCOLS`."""
 
 DEFAULT_PROTOCOL: Final = "tsttc-1"
 

@@ -12,12 +12,12 @@ import re
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from numpy.typing import ArrayLike
 
 from evaluator.arguments import Source, data_of, require
-from evaluator.arrays import in_row_order
+from evaluator.arrays import as_floats, chosen_rows, in_row_order
 from evaluator.counting import counted, file_size
 from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
 from evaluator.predictions.alignment import KeyKind, read_slowly
@@ -84,6 +84,36 @@ class Predictions:
         values.setflags(write=False)
         content_digest = digest if digest is not None else sha256_digest(values.astype("<f8").tobytes())
         return cls(manifest=manifest, ttc_s=values, digest=content_digest, unit=unit)
+
+    @classmethod
+    def from_dict(cls, seconds: Mapping[Any, Any], *, manifest: Manifest) -> Predictions:
+        """Predictions from seconds by anno_id or natural key, in any order, as a file has them.
+
+        Anno_ids may be integers, values tensors of one element. Raises `Rejected` in the words that a file
+        would get.
+        """
+        require(manifest, Manifest, name="manifest")
+        pairs = ((str(key), as_floats(value).item()) for key, value in seconds.items())
+        members = ",".join(f"{json.dumps(key)}:{json.dumps(value)}" for key, value in pairs)
+        return read_sent(f"{{{members}}}".encode(), manifest=manifest)
+
+    @classmethod
+    def merge(cls, parts: Iterable[Predictions], *, manifest: Manifest) -> Predictions:
+        """The predictions of parts of `manifest`, such as batches or the shares of several processes, in one.
+
+        Of a sequence in two parts the first counts: samplers repeat some to fill a batch. Raises `Rejected`
+        for sequences that no part has.
+        """
+        seconds: dict[str, float] = {}
+        for part in parts:
+            values = zip(part.manifest.natural_keys, part.ttc_s.tolist(), strict=True)
+            seconds = dict(values) | seconds
+        return cls.from_dict(seconds, manifest=manifest)
+
+    def subset(self, chosen: ArrayLike) -> Predictions:
+        """Those of the sequences that a mask (n,) or row numbers choose; raises `ValueError`."""
+        rows = chosen_rows(chosen, n_sequences=self.manifest.n_sequences)
+        return Predictions.from_arrays(ttc_s=self.ttc_s[rows], manifest=self.manifest.subset(rows))
 
     def where(self, row: int) -> str:
         """Return the JSON pointer to the value of sequence `row`."""

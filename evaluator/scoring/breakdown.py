@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,8 @@ CURVE_EDGES_S: Final = (
     20,
 )
 """Edges of the true time to contact in seconds, the ends of the paper's ranges among them."""
+
+GroupName = Literal["recording", "camera", "range", "occlusion", "lane", "box-size"]
 
 NOT_STATED: Final = "not stated"
 

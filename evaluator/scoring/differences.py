@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol, primary_of
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, ProtocolName, get_protocol, primary_of
 from evaluator.metrics.scale import Floats
 from evaluator.predictions.loading import Predictions
 from evaluator.scoring.results import rounded
@@ -20,7 +20,7 @@ from evaluator.scoring.scores import Scorer
 from evaluator.scoring.significance import SIGNIFICANT, Difference, Influence, cut_off, p_below
 from evaluator.scoring.uncertainty import by_units, degrees_of, generator_of, usable_columns
 from evaluator.truth.ground_truth import GroundTruth
-from evaluator.units import RECORDING
+from evaluator.units import RECORDING, UnitKind
 
 N_SIGN_FLIPS: Final = 9_999
 P_DECIMALS: Final = 4
@@ -241,10 +241,10 @@ def compare_predictions(
     second: Predictions,
     truth: GroundTruth,
     *,
-    protocol: str | Protocol = DEFAULT_PROTOCOL,
+    protocol: ProtocolName | Protocol = DEFAULT_PROTOCOL,
     n_flips: int = N_SIGN_FLIPS,
     decimals: int | None = PUBLISHED_DECIMALS,
-    unit: str | None = None,
+    unit: UnitKind | None = None,
 ) -> dict[str, Difference]:
     """Compare two predictions of the same sequences: first minus second, by score name.
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, ProtocolName, get_protocol
 from evaluator.predictions.loading import Predictions
 from evaluator.scoring.results import RecordingSums
 from evaluator.scoring.scores import Scorer
 from evaluator.scoring.uncertainty import bootstrap_of, by_units
 from evaluator.truth.ground_truth import GroundTruth
+from evaluator.units import UnitKind
 
 
 def recording_sums(
-    predictions: Predictions, truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL
+    predictions: Predictions, truth: GroundTruth, *, protocol: ProtocolName | Protocol = DEFAULT_PROTOCOL
 ) -> RecordingSums:
     """Sum errors per recording; raises as `evaluate` does."""
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
@@ -26,8 +27,8 @@ def confidence_intervals(
     predictions: Predictions,
     truth: GroundTruth,
     *,
-    protocol: str | Protocol = DEFAULT_PROTOCOL,
-    unit: str | None = None,
+    protocol: ProtocolName | Protocol = DEFAULT_PROTOCOL,
+    unit: UnitKind | None = None,
 ) -> dict[str, tuple[float, float] | None]:
     """Compute the 95 % interval of each score as the board shows it; None where there is none.
 

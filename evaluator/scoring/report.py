@@ -11,14 +11,19 @@ from typing import TYPE_CHECKING
 from evaluator.counting import counted
 from evaluator.metrics.protocol import OVERALL, metric_of, range_of, score_name
 from evaluator.metrics.scale import Floats
-from evaluator.scoring.breakdown import groups_of, scores_of
+from evaluator.scoring.breakdown import GroupName, groups_of, scores_of
 from evaluator.scoring.results import Details, GroupScores, RangeScore, RecordingSums, format_rounded
 
 if TYPE_CHECKING:
     from pathlib import Path
+    from typing import Literal
 
     import pandas as pd
     from matplotlib.figure import Figure
+
+    from evaluator.units import UnitKind
+
+    PlotKind = Literal["error", "scatter", "distribution"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +84,7 @@ class Report:
     # --- a closer look ------------------------------------------------------------------------------------
 
     def breakdown(
-        self, by: str, *, with_intervals: bool = False, unit: str | None = None
+        self, by: GroupName, *, with_intervals: bool = False, unit: UnitKind | None = None
     ) -> list[GroupScores]:
         """Score each group: `by` is recording, camera, range, occlusion, lane or box-size.
 
@@ -97,7 +102,7 @@ class Report:
             unit=unit,
         )
 
-    def by(self, group: str, *, with_intervals: bool = False) -> pd.DataFrame:
+    def by(self, group: GroupName, *, with_intervals: bool = False) -> pd.DataFrame:
         """Return `breakdown` as a frame by group: `n_sequences`, `n_recordings`, scores. Needs pandas.
 
         With intervals, each score has two more columns, such as `mid_low` and `mid_high`.
@@ -144,7 +149,7 @@ class Report:
         return pd.DataFrame(self.records()).set_index("anno_id")
 
     def plot(
-        self, kind: str = "error", *, path: str | Path | None = None, name: str = "", **others: Report
+        self, kind: PlotKind = "error", *, path: str | Path | None = None, name: str = "", **others: Report
     ) -> Figure:
         """Draw `kind`: `error` (by true TTC, with a band), `scatter` or `distribution`. Needs matplotlib.
 

@@ -27,6 +27,7 @@ from evaluator.metrics.protocol import (
     DEFAULT_PROTOCOL,
     OVERALL,
     Protocol,
+    ProtocolName,
     column_words,
     get_protocol,
     known_names,
@@ -48,7 +49,7 @@ def evaluate(
     predictions: Predictions,
     truth: GroundTruth,
     *,
-    protocol: str | Protocol = DEFAULT_PROTOCOL,
+    protocol: ProtocolName | Protocol = DEFAULT_PROTOCOL,
     keep_sequences: bool = False,
     keep_bags: bool = False,
 ) -> Report:
@@ -199,7 +200,9 @@ def _refuse(predictions: Predictions, protocol: Protocol) -> NoReturn:
     raise AssertionError("unreachable: the caller saw a forbidden value")
 
 
-def floor_of(truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL) -> dict[str, float | None]:
+def floor_of(
+    truth: GroundTruth, *, protocol: ProtocolName | Protocol = DEFAULT_PROTOCOL
+) -> dict[str, float | None]:
     """Score the ground truth itself; None for an empty TTC range."""
     predictions = Predictions.from_arrays(ttc_s=truth.ttc_s, manifest=truth.manifest)
     return evaluate(predictions, truth, protocol=protocol).flat()

@@ -11,7 +11,7 @@ import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -72,6 +72,11 @@ class Table:
             return f"row {row + 1}"
         location = self.locations[row]
         return location if isinstance(location, str) else f"line {location}"
+
+    def subset(self, rows: Sequence[int]) -> Table:
+        """These rows of every column that is there."""
+        columns = {name: getattr(self, name) for name in Table.__slots__}
+        return Table(**{name: [column[row] for row in rows] for name, column in columns.items() if column})
 
     def text(self, columns: tuple[str, ...], *, order: list[int] | None = None) -> str:
         """Return the table as CSV text in this row order, times to contact in shortest exact form."""

@@ -104,7 +104,9 @@ def _units(truth_digest: str, kind: str) -> Units:
 
 def floor_of(edition: Edition) -> dict[str, float | None]:
     """Return the score of the ground truth itself. Raises `OSError` without access to it."""
-    floor = scores.floor_of(truth_values.load(edition.ground_truth_id), protocol=edition.protocol)
+    floor = scores.floor_of(
+        truth_values.load(edition.ground_truth_id), protocol=get_protocol(edition.protocol)
+    )
     return {name: rounded(value, decimals=edition.decimals) for name, value in floor.items()}
 
 

@@ -47,5 +47,5 @@ def baseline() -> None:
 
 def require_opencv() -> None:
     if find_spec("cv2") is None:
-        message = "The baselines need OpenCV; install it with: pip install '.[baselines]' in a checkout."
+        message = "The baselines need OpenCV; install it with: pip install opencv-python-headless"
         raise Failure(message, exit_code=Exit.USAGE, code="no-opencv")

@@ -142,7 +142,7 @@ def train(
     weights = _start(start) if start else None
     wanted = _use(recipe, start=weights)
     if find_spec("torch") is None:
-        message = "Training needs torch; install it with: pip install '.[train]' in a checkout."
+        message = "Training needs torch; install it with: pip install torch"
         raise Failure(message, exit_code=Exit.USAGE, code="no-torch")
     from tsttc_baselines.cli.progress import shown_progress  # noqa: PLC0415 -- OpenCV and torch, as above
     from tsttc_baselines.deep_scale import training  # noqa: PLC0415 -- as above

@@ -138,7 +138,7 @@ def operations_on(device: Device, weights: Weights) -> Operations:
     if device == "numpy":
         return NumpyLayers(weights.tensors)
     if find_spec("torch") is None:
-        raise ValueError(f"--device {device} needs torch; install it with: pip install '.[train]'")
+        raise ValueError(f"--device {device} needs torch; install it with: pip install torch")
     import torch  # noqa: PLC0415 -- an extra, which numpy can do without
 
     from tsttc_baselines.deep_scale.torch_layers import TorchLayers  # noqa: PLC0415 -- as above

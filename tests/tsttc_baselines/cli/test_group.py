@@ -66,5 +66,5 @@ def test_without_opencv_a_sentence_says_how_to_install_it(
     result = tsttc("baseline", "run", "detection", tmp_path, "--out", tmp_path / "p.json")
     assert result.exit_code == 2
     assert result.stderr == (
-        "Error: The baselines need OpenCV; install it with: pip install '.[baselines]' in a checkout.\n"
+        "Error: The baselines need OpenCV; install it with: pip install opencv-python-headless\n"
     )

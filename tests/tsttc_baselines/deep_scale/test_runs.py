@@ -56,11 +56,11 @@ def test_a_device_without_torch_is_refused(tsttc: Tsttc, folder: Path, weights: 
     options = ["--out", tmp_path / "p.json", "--weights", weights, "--device", "cpu"]
     result = tsttc("baseline", "run", "deep-scale", folder, *options)
     assert result.exit_code == 2
-    assert "--device cpu needs torch; install it with: pip install '.[train]'" in result.stderr
+    assert "--device cpu needs torch; install it with: pip install torch" in result.stderr
 
 
 @pytest.mark.skipif(find_spec("torch") is not None, reason="torch is installed")
 def test_training_without_torch_is_refused(tsttc: Tsttc, tmp_path: Path) -> None:
     result = tsttc("baseline", "train", "--out", tmp_path / "w.npz")
     assert result.exit_code == 2
-    assert "Training needs torch; install it with: pip install '.[train]' in a checkout." in result.stderr
+    assert "Training needs torch; install it with: pip install torch" in result.stderr
