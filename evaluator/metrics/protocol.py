@@ -232,6 +232,7 @@ PROTOCOLS: Final[dict[str, Protocol]] = registered(
     Protocol(name="tsttc-1", limit_s=20.0, near_zero_s=(-0.15, 0.05)),
     Protocol(name="toolkit", limit_s=20.0, near_zero_s=None),
 )
+"""Every protocol by its name."""
 
 ProtocolName = Literal["tsttc-1", "toolkit"]
 """For a type checker and an editor; `get_protocol` takes every name of `PROTOCOLS`."""

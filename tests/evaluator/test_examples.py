@@ -1,8 +1,9 @@
-"""The programs of examples/ run as they stand, and the page about CI shows parts of them."""
+"""The programs of examples/ and the lines of the page about Python run as they stand."""
 
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ from tests.evaluator.worlds import EXAMPLES, REPOSITORY
 
 PROGRAMS = sorted(EXAMPLES.glob("*.py"))
 PAGE = (REPOSITORY / "docs" / "ci.md").read_text(encoding="utf-8")
+PYTHON = (REPOSITORY / "docs" / "python.md").read_text(encoding="utf-8")
 
 
 def printed(program: Path, folder: Path) -> list[str]:
@@ -77,13 +79,24 @@ def test_a_training_loop_gets_better_and_ends_with_a_file(tmp_path: Path) -> Non
 
 
 def test_every_program_is_named_where_the_examples_are_and_on_the_page() -> None:
-    for text in (PAGE, (EXAMPLES / "README.md").read_text(encoding="utf-8")):
+    for text in (PYTHON, (EXAMPLES / "README.md").read_text(encoding="utf-8")):
         assert [path.name for path in PROGRAMS if f"`{path.name}`" not in text] == []
 
 
-@pytest.mark.parametrize("snippet", re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL))
-def test_snippet_of_the_page_is_part_of_a_program_that_runs(snippet: str) -> None:
-    assert any(snippet in program.read_text(encoding="utf-8") for program in PROGRAMS)
+def test_lines_of_the_page_about_python_run_in_a_copy_of_the_examples(tmp_path: Path) -> None:
+    shutil.copytree(EXAMPLES, tmp_path / "examples")
+    program = tmp_path / "page.py"
+    program.write_text("\n".join(re.findall(r"```python\n(.*?)```", PYTHON, re.DOTALL)), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", program],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path / "examples",
+        env={"PYTHONPATH": str(REPOSITORY), "PYTHONIOENCODING": "utf-8"},
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "nan /30 The value is NaN" in done.stdout
 
 
 def test_page_names_commands_options_and_exit_codes_that_there_are() -> None:

@@ -12,6 +12,7 @@ from django.templatetags.static import static
 from django.urls import reverse
 
 from leaderboard.web import markdown
+from leaderboard.web.docs import python_reference
 from leaderboard.web.markdown import Document
 
 _REPOSITORY: Final = Path(settings.BASE_DIR)
@@ -28,6 +29,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Annotation": "annotation",
         "Prediction files": "file-format",
         "Command line": "cli",
+        "Python": "python",
         "From CI": "ci",
         "API": "api-guide",
         "API reference": "",
@@ -52,6 +54,8 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
     },
     "For developers": {"Architecture": "architecture", "Decisions": "decisions"},
 }
+_PYTHON: Final = "python"
+"""The guide that the reference of the packages follows."""
 _SCHEMES: Final = {"http", "https", "mailto"}
 _VIEW_BOX: Final = re.compile(r'viewBox="0 0 ([0-9.]+) ([0-9.]+)"')
 
@@ -116,11 +120,14 @@ def neighbours(name: str) -> tuple[GuideLink | None, GuideLink | None]:
 def guide(name: str) -> Document:
     """Render a guide, once in a process. Raises `KeyError`."""
     path = files()[name]
+    text = path.read_text(encoding="utf-8")
+    if name == _PYTHON:
+        text = f"{text}\n{python_reference.text()}"
 
     def link(address: str) -> str:
         return _link(address, source=path)
 
-    return markdown.guide(path.read_text(encoding="utf-8"), link=link, image=_image)
+    return markdown.guide(text, link=link, image=_image)
 
 
 def _link(address: str, *, source: Path) -> str:

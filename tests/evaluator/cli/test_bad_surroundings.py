@@ -53,6 +53,6 @@ def test_another_web_server_is_called_that_by_every_command(tsttc: Tsttc, site: 
     assert (result.exit_code, "did not answer like a leaderboard: 404" in result.stderr) == (3, True)
 
 
-def test_value_at_fault_is_said_without_the_usage(tsttc: Tsttc) -> None:
+def test_message_about_a_value_has_no_usage_lines(tsttc: Tsttc) -> None:
     result = tsttc("score", "nowhere.json", "--truth", EXAMPLES / "truth.csv")
     assert result.stderr == "Error: Invalid value for 'PREDICTIONS': File 'nowhere.json' does not exist.\n"

@@ -48,7 +48,7 @@ def test_result_and_gates_are_appended(tsttc: Tsttc, site: RecordedSite, tmp_pat
     assert lines[-2].startswith(f"Submission: <{site.url}/submissions/1/>")
 
 
-def test_failure_is_told_with_its_problems(tsttc: Tsttc, site: RecordedSite, tmp_path: Path) -> None:
+def test_failure_lists_its_problems(tsttc: Tsttc, site: RecordedSite, tmp_path: Path) -> None:
     bad, late = tmp_path / "bad.md", tmp_path / "late.md"
     manifest = (EXAMPLES / "manifest.csv").read_bytes()
     site.put("GET /api/v1/splits/val/manifest", Reply(manifest, headers={"Content-Type": "text/csv"}))

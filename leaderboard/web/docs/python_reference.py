@@ -1,0 +1,178 @@
+"""The reference of the Python packages, as Markdown below the guide `docs/python.md`.
+
+It reads the sources and imports nothing: a server has neither OpenCV nor torch, which some modules need.
+"""
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from django.conf import settings
+
+_ROOT: Final = Path(settings.BASE_DIR)
+_MAX_WIDTH: Final = 88
+# The default of a dataclass's field, where it is written as a call.
+_FIELD: Final = re.compile(r"\bfield\((?:default=([\w.]+))?.*\)$")
+
+KIT: Final[dict[str, tuple[str, ...]]] = {
+    "tsttc_baselines.folders": ("read_folder", "SequenceFolder"),
+    "tsttc_baselines.images": ("ImageCache",),
+    "tsttc_baselines.clips": ("Clip",),
+    "tsttc_baselines.estimates": ("Estimator", "Estimate", "Unusable"),
+    "tsttc_baselines.methods": ("get_method", "Method", "Parameter"),
+    "tsttc_baselines.running": ("run_method", "Run"),
+    "tsttc_baselines.boxes": ("scale_ratio_of_boxes", "expand", "is_usable"),
+    "tsttc_baselines.deep_scale.weights": ("read_weights", "write_weights", "Weights"),
+}
+"""The public names of the starter kit by their modules, which is how they are imported."""
+
+RESULTS: Final[dict[str, tuple[str, ...]]] = {
+    "evaluator.client.answers": (
+        *("Account", "Board", "BoardEntry", "Compared", "ConfidenceInterval", "Foreseen", "Method", "Pair"),
+        *("Queue", "Quota", "Submission", "BadAnswer", "Refused", "TimedOut", "Unreachable"),
+    ),
+    "evaluator.metrics.protocol": ("TTCRange",),
+    "evaluator.metrics.registry": ("Metric",),
+    "evaluator.problems": ("FileWarning",),
+    "evaluator.scoring.results": ("GroupScores",),
+    "evaluator.truth.numbering": ("Numbering",),
+    "evaluator.truth.objects": ("Objects",),
+    "evaluator.units": ("Units",),
+}
+"""What the functions of `evaluator` give, and is not imported from it."""
+
+_Definition = ast.FunctionDef | ast.ClassDef
+
+
+def text() -> str:
+    """The reference of both packages as Markdown."""
+    parts = ["## Reference: evaluator", "", "Import these names from `evaluator`.", ""]
+    for name, module in sorted(_homes().items(), key=lambda each: each[0].lower()):
+        parts += _entry(name, module, shown=f"evaluator.{name}")
+    for title, modules in (("results of evaluator", RESULTS), ("starter kit", KIT)):
+        parts += [f"## Reference: {title}", "", "Each name belongs to the module before it.", ""]
+        for module, names in modules.items():
+            for name in names:
+                parts += _entry(name, module, shown=f"{module}.{name}")
+    return "\n".join(parts)
+
+
+def _homes() -> dict[str, str]:
+    """The public names of `evaluator`, and the module that defines each."""
+    tree = _tree("evaluator")
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module]
+    return {
+        alias.name: str(node.module)
+        for node in imports
+        for alias in node.names
+        if str(node.module).startswith("evaluator.")
+    }
+
+
+@cache
+def _tree(module: str) -> ast.Module:
+    path = _ROOT.joinpath(*module.split("."))
+    source = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    return ast.parse(source.read_text(encoding="utf-8"))
+
+
+def _entry(name: str, module: str, *, shown: str) -> Iterator[str]:
+    """A heading, the signature and the docstring of a name; of a class its public members as well.
+
+    Raises `KeyError` for a name that the module does not define.
+    """
+    body = _tree(module).body
+    yield f"### {shown}"
+    yield ""
+    for number, node in enumerate(body):
+        if isinstance(node, _Definition) and node.name == name:
+            yield from _code(_signature(node, shown))
+            yield from _words(ast.get_docstring(node))
+            if isinstance(node, ast.ClassDef):
+                yield from _members(node)
+            return
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.target.id == name:
+            following = body[number + 1] if number + 1 < len(body) else None
+            yield from _words(_string(following))
+            return
+    raise KeyError(f"{module} does not define {name}")
+
+
+def _members(node: ast.ClassDef) -> Iterator[str]:
+    """The public methods and properties of a class, as a list."""
+    lines = []
+    for each in node.body:
+        if not isinstance(each, ast.FunctionDef) or each.name.startswith("_"):
+            continue
+        marks = {ast.unparse(mark).rpartition(".")[2] for mark in each.decorator_list}
+        call = each.name if marks & {"property", "cached_property"} else f"{each.name}{_call(each)}"
+        about = (ast.get_docstring(each) or "").partition("\n\n")[0].replace("\n", " ")
+        lines.append(f"- `{call}`: {about}")
+    yield from lines
+    if lines:
+        yield ""
+
+
+def _signature(node: _Definition, shown: str) -> str:
+    """How it is called: a function's arguments and result, or the fields of a dataclass."""
+    if isinstance(node, ast.ClassDef):
+        made = next((e for e in node.body if isinstance(e, ast.FunctionDef) and e.name == "__init__"), None)
+        fields = [
+            _FIELD.sub(lambda match: match[1] or "…", ast.unparse(each))
+            for each in node.body
+            if isinstance(each, ast.AnnAssign)
+        ]
+        is_keyword_only = any("kw_only=True" in ast.unparse(mark) for mark in node.decorator_list)
+        parts = _arguments(made) if made else [*(["*"] if is_keyword_only else []), *fields]
+        is_abstract = any(ast.unparse(base) in {"Protocol", "Exception"} for base in node.bases)
+        return shown if is_abstract else _wrapped(shown, parts, "")
+    return _wrapped(shown, _arguments(node), _result(node))
+
+
+def _call(node: ast.FunctionDef) -> str:
+    return f"({', '.join(_arguments(node))}){_result(node)}"
+
+
+def _result(node: ast.FunctionDef) -> str:
+    return f" -> {ast.unparse(node.returns)}" if node.returns else ""
+
+
+def _arguments(node: ast.FunctionDef) -> list[str]:
+    """The arguments as they are written, without the first of a method."""
+    parts, depth = [""], 0
+    for character in ast.unparse(node.args):
+        depth += (character in "([{") - (character in ")]}")
+        if character == "," and not depth:
+            parts.append("")
+        else:
+            parts[-1] += character
+    arguments = [part.strip() for part in parts if part.strip() not in {"", "self", "cls"}]
+    return [re.sub(r"^(\w+: [^=]+)=", r"\1 = ", argument) for argument in arguments]
+
+
+def _wrapped(shown: str, parts: list[str], result: str) -> str:
+    line = f"{shown}({', '.join(parts)}){result}"
+    if len(line) <= _MAX_WIDTH:
+        return line
+    return f"{shown}(\n" + "".join(f"    {part},\n" for part in parts) + f"){result}"
+
+
+def _code(signature: str) -> Iterator[str]:
+    yield from ("```python", signature, "```", "")
+
+
+def _words(docstring: str | None) -> Iterator[str]:
+    """A docstring as Markdown: its examples become blocks of code."""
+    if docstring:
+        yield re.sub(r"(?m)(^>>>(?:.+\n?)+)", r"```python\n\1\n```\n", docstring)
+        yield ""
+
+
+def _string(node: ast.stmt | None) -> str | None:
+    """The text of a bare string, as below a constant."""
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+        return str(node.value.value)
+    return None

@@ -1,0 +1,36 @@
+"""The reference of the Python packages has every public name, as it is."""
+
+import inspect
+import re
+
+import evaluator
+from leaderboard.web.docs import guides, python_reference
+
+TEXT = python_reference.text()
+ENTRIES = dict(re.findall(r"^### (\S+)\n(.*?)(?=^##|\Z)", TEXT, re.MULTILINE | re.DOTALL))
+
+
+def test_every_public_name_is_there_with_words() -> None:
+    expected = {f"evaluator.{name}" for name in evaluator.__all__ if name != "__version__"}
+    further = {**python_reference.KIT, **python_reference.RESULTS}
+    expected |= {f"{module}.{name}" for module, names in further.items() for name in names}
+    assert set(ENTRIES) == expected
+    words = {
+        name: re.sub(r"```.*?```", "", entry, flags=re.DOTALL).strip() for name, entry in ENTRIES.items()
+    }
+    assert [name for name, text in words.items() if not text] == []
+
+
+def test_arguments_are_those_of_the_function() -> None:
+    signature = inspect.signature(evaluator.write_predictions)
+    shown = ENTRIES["evaluator.write_predictions"]
+    assert re.findall(r"^    (\w+):", shown, re.MULTILINE) == list(signature.parameters)
+    assert "    ttc_s: ArrayLike | None = None,\n" in shown
+    assert "timeout_s: float = 15.0,\n    retry_policy: RetryPolicy = …," in ENTRIES["evaluator.Client"]
+
+
+def test_guide_ends_with_the_reference() -> None:
+    page = guides.guide("python")
+    chapters = [heading.text for heading in page.chapters]
+    assert chapters[0] == "Score a file"
+    assert chapters[-1] == "Reference: starter kit"
