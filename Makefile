@@ -71,7 +71,7 @@ release: ## build wheel and sdist of REF (default HEAD), check them as their use
 
 # Universal: one file for every platform and Python; hashes, and no index host. Existing pins stay unless
 # `make lock UPGRADE=--upgrade` asks for newer ones.
-LOCK := $(VENV)-lock/bin/uv pip compile pyproject.toml --extra server --extra frames --group build \
+LOCK := $(VENV)-lock/bin/uv pip compile pyproject.toml --extra pandas --group server --group build \
 	--universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --quiet $(UPGRADE)
 
 lock: ## pin the dependencies of pyproject.toml anew

@@ -1,4 +1,4 @@
-"""Pandas frames in and out, for those who keep their predictions so; needs `pip install .[frames]`."""
+"""Pandas frames in and out, for those who keep their predictions so; needs pandas."""
 
 from __future__ import annotations
 

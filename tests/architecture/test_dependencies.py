@@ -28,7 +28,7 @@ def pins(lock: str) -> dict[str, set[Version]]:
 def wanted(*, dev: bool) -> list[Requirement]:
     project, groups = PROJECT["project"], PROJECT["dependency-groups"]
     extras = project["optional-dependencies"]
-    lines = [*project["dependencies"], *extras["server"], *extras["frames"], *groups["build"]]
+    lines = [*project["dependencies"], *extras["pandas"], *groups["server"], *groups["build"]]
     return [Requirement(line) for line in (*lines, *(groups["dev"] if dev else ()))]
 
 
@@ -49,6 +49,13 @@ def test_a_lock_file_satisfies_pyproject(lock: str, dev: bool) -> None:
         or not all(v in requirement.specifier for v in pinned[canonicalize_name(requirement.name)])
     ]
     assert unmet == []
+
+
+def test_what_an_index_shows_has_every_extra_and_no_relative_link() -> None:
+    page = (REPOSITORY / PROJECT["project"]["readme"]).read_text(encoding="utf-8")
+    extras = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)
+    assert set(extras) == set(PROJECT["project"]["optional-dependencies"])
+    assert re.findall(r"\]\((?!https://)", page) == []
 
 
 def test_both_lock_files_pin_the_same_versions() -> None:

@@ -11,6 +11,7 @@ import pytest
 import yaml
 from django.conf import settings
 
+from leaderboard.management.commands import build_wheel
 from leaderboard.web.docs import guides
 
 pytestmark = pytest.mark.slow
@@ -163,6 +164,7 @@ def test_the_image_has_everything_that_the_pages_are_made_of() -> None:
     folders = [entry[1] if isinstance(entry, tuple) else entry for entry in settings.STATICFILES_DIRS]
     read = [Path(path) for path in (*folders, REPOSITORY / "templates", *guides.files().values())]
     assert [path for path in read if path.relative_to(REPOSITORY).parts[0] not in let_in] == []
+    assert {*build_wheel.PACKAGES, *build_wheel.FILES} <= let_in
     assert "manage.py build_wheel" in (REPOSITORY / "Dockerfile").read_text()
 
 

@@ -17,7 +17,7 @@ BARE_NAME = re.compile(r"pip install\b[^\n`]*?[ \"']tsttc(?![\w.-]|(?:\[[\w,-]*\
 
 def texts() -> list[Path]:
     """Everything that tells people what to type."""
-    paths = [REPOSITORY / "README.md", REPOSITORY / "CONTRIBUTING.md"]
+    paths = [REPOSITORY / name for name in ("README.md", "PACKAGE.md", "CONTRIBUTING.md")]
     for folder, pattern in (
         ("docs", "*.md"),
         ("examples", "*"),
@@ -30,7 +30,7 @@ def texts() -> list[Path]:
 
 
 def test_nothing_that_we_tell_people_to_type_installs_by_the_bare_name() -> None:
-    for bad in ("pip install tsttc", "pip install -U 'tsttc[frames]'", 'pip install "tsttc==0.1.0"'):
+    for bad in ("pip install tsttc", "pip install -U 'tsttc[pandas]'", 'pip install "tsttc==0.1.0"'):
         assert BARE_NAME.search(bad), bad
     assert not BARE_NAME.search('pip install "tsttc @ git+https://example.org/x@1"')
     bare = {path.name: match[0] for path in texts() if (match := BARE_NAME.search(path.read_text("utf-8")))}

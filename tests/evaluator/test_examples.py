@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
 import subprocess
@@ -14,10 +15,13 @@ from evaluator import TTC_RANGES, evaluate, read_predictions, read_truth
 from evaluator.cli import own_commands
 from evaluator.cli.exits import Exit
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY
+from tsttc_baselines.methods import OWN_WEIGHTS
 
 PROGRAMS = sorted(EXAMPLES.glob("*.py"))
 PAGE = (REPOSITORY / "docs" / "ci.md").read_text(encoding="utf-8")
-PYTHON = (REPOSITORY / "docs" / "python.md").read_text(encoding="utf-8")
+PYTHON, MODELS = (
+    (REPOSITORY / "docs" / name).read_text(encoding="utf-8") for name in ("python.md", "models.md")
+)
 
 
 def printed(program: Path, folder: Path) -> list[str]:
@@ -83,10 +87,12 @@ def test_every_program_is_named_where_the_examples_are_and_on_the_page() -> None
         assert [path.name for path in PROGRAMS if f"`{path.name}`" not in text] == []
 
 
-def test_lines_of_the_page_about_python_run_in_a_copy_of_the_examples(tmp_path: Path) -> None:
+def test_lines_of_the_pages_about_python_and_models_run_in_a_copy_of_the_examples(tmp_path: Path) -> None:
     shutil.copytree(EXAMPLES, tmp_path / "examples")
     program = tmp_path / "page.py"
-    program.write_text("\n".join(re.findall(r"```python\n(.*?)```", PYTHON, re.DOTALL)), encoding="utf-8")
+    program.write_text(
+        "\n".join(re.findall(r"```python\n(.*?)```", PYTHON + MODELS, re.DOTALL)), encoding="utf-8"
+    )
     done = subprocess.run(
         [sys.executable, "-W", "error", program],
         capture_output=True,
@@ -97,6 +103,7 @@ def test_lines_of_the_page_about_python_run_in_a_copy_of_the_examples(tmp_path: 
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert "nan /30 The value is NaN" in done.stdout
+    assert hashlib.sha256(OWN_WEIGHTS.read_bytes()).hexdigest() in MODELS
 
 
 def test_page_names_commands_options_and_exit_codes_that_there_are() -> None:

@@ -1,4 +1,4 @@
-"""`manage.py build_wheel`: the wheel that the site serves at `/dist/`."""
+"""`manage.py build_wheel`: the wheel and the archive of examples that the site serves at `/dist/`."""
 
 import os
 import shutil
@@ -7,12 +7,15 @@ import sys
 import tempfile
 from pathlib import Path
 from typing import Any, Final
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from django.conf import settings
 from django.core.management.base import BaseCommand, CommandError
 
+from leaderboard.web.docs.wheels import EXAMPLES
+
 PACKAGES: Final = ("evaluator", "tsttc_baselines")
-_FILES: Final = ("pyproject.toml", "README.md", "LICENSE")
+FILES: Final = ("pyproject.toml", "PACKAGE.md", "LICENSE")
 _BUILD: Final = "import sys; from setuptools import build_meta; build_meta.build_wheel(sys.argv[1])"
 # The time of every file in the wheel, the first that a zip can say: the same sources make the same bytes.
 _EPOCH_S: Final = "315532800"
@@ -35,7 +38,7 @@ def build() -> Path:
         made.mkdir()
         for name in PACKAGES:
             shutil.copytree(root / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
-        for name in _FILES:
+        for name in FILES:
             shutil.copy(root / name, source)
         done = subprocess.run(  # noqa: S603 - our own interpreter on our own sources
             [sys.executable, "-c", _BUILD, str(made)],
@@ -48,11 +51,27 @@ def build() -> Path:
         if done.returncode:
             raise CommandError(f"setuptools could not build the wheel:\n{done.stderr.strip()[-2000:]}")
         (wheel,) = made.glob("*.whl")
-        # Beside its place first: nobody is served one that is half there.
-        waiting = out / f".{wheel.name}"
-        shutil.copy(wheel, waiting)
-        waiting.chmod(0o644)
-        return waiting.replace(out / wheel.name)
+        _put(_pack_examples(root / "examples", made / EXAMPLES), out=out)
+        return _put(wheel, out=out)
+
+
+def _put(path: Path, *, out: Path) -> Path:
+    # Beside its place first: nobody is served one that is half there.
+    waiting = out / f".{path.name}"
+    shutil.copy(path, waiting)
+    waiting.chmod(0o644)
+    return waiting.replace(out / path.name)
+
+
+def _pack_examples(folder: Path, path: Path) -> Path:
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        for each in sorted(folder.rglob("*")):
+            if each.is_file() and "__pycache__" not in each.parts:
+                entry = ZipInfo(
+                    f"tsttc-examples/{each.relative_to(folder).as_posix()}"
+                )  # of 1980, as the wheel
+                archive.writestr(entry, each.read_bytes(), ZIP_DEFLATED)
+    return path
 
 
 def is_built() -> bool:

@@ -95,7 +95,7 @@ def dist(request: HttpRequest) -> HttpResponse:
 
 @require_safe
 def dist_file(request: HttpRequest, wheel_name: str) -> HttpResponseBase:
-    path = next((each for each in wheels.paths() if each.name == wheel_name), None)
+    path = next((each for each in wheels.files() if each.name == wheel_name), None)
     if path is None:
         raise Http404(f"There is no wheel {wheel_name!r}.")
     return FileResponse(path.open("rb"), as_attachment=True, content_type="application/zip")

@@ -26,6 +26,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Quick start": "researchers",
         "Baselines": "baselines",
         "Deep Scale": "deep-scale",
+        "Models": "models",
         "Annotation": "annotation",
         "Prediction files": "file-format",
         "Command line": "cli",

@@ -1,11 +1,18 @@
-"""The wheel that the site serves from `settings.DIST_DIR`, with its digest; see `manage.py build_wheel`."""
+"""The wheel and the examples that the site serves from `settings.DIST_DIR`; see `manage.py build_wheel`."""
 
 import hashlib
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from django.conf import settings
 from django.urls import reverse
+
+EXAMPLES: Final = "tsttc-examples.zip"
+
+
+def files() -> list[Path]:
+    """List every file that the site serves here."""
+    return [*paths(), *Path(settings.DIST_DIR).glob(EXAMPLES)]
 
 
 def paths() -> list[Path]:
@@ -23,4 +30,5 @@ def current() -> dict[str, Any] | None:
         "address": settings.SITE_URL + reverse("dist_file", args=[path.name]),
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "n_bytes": path.stat().st_size,
+        "examples": EXAMPLES if path.with_name(EXAMPLES).exists() else "",
     }

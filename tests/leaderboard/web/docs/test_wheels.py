@@ -16,6 +16,7 @@ from django.http import FileResponse
 from django.test import Client, override_settings
 
 from leaderboard.management.commands import build_wheel
+from leaderboard.web.docs.wheels import EXAMPLES
 from tests import pages
 from tests.leaderboard.web.test_every_page import assert_sound
 
@@ -49,7 +50,7 @@ def test_the_page_shows_the_line_that_installs_it_its_version_and_its_digest(
     lines = [pre.text for pre in root.all("pre")]
     assert lines[0] == f"pip install {address}"
     digest = hashlib.sha256(served(client, dist)).hexdigest()
-    assert lines[-1] == f'pip install "{address}#sha256={digest}"'
+    assert f'pip install "{address}#sha256={digest}"' in lines
     assert digest in root.one("dl").text
     assert f"tsttc {dist.name.split('-')[1]}" in root.one("article").text
     assert lines[0] in [pre.text for pre in pages.get(client, "/docs/").all("pre")]
@@ -105,6 +106,14 @@ def test_the_wheel_installs_into_an_empty_environment_and_prints_its_version(
     assert Path(location.stdout.strip()).is_relative_to(home)
 
 
+def test_examples_are_served_beside_the_wheel(client: Client, benchmark: None, dist: Path) -> None:
+    pages.get(client, "/dist/").one("a", href=f"/dist/{EXAMPLES}")
+    with ZipFile(BytesIO(served(client, dist.with_name(EXAMPLES)))) as archive:
+        names = set(archive.namelist())
+    assert {"tsttc-examples/truth.csv", "tsttc-examples/baseline/boxes.csv"} <= names
+    assert not [name for name in names if "__pycache__" in name]
+
+
 def test_without_a_wheel_the_page_says_so_in_words(client: Client, benchmark: None, tmp_path: Path) -> None:
     with override_settings(DIST_DIR=tmp_path / "none"):
         answer = client.get("/dist/")
@@ -114,7 +123,7 @@ def test_without_a_wheel_the_page_says_so_in_words(client: Client, benchmark: No
         assert "pip install ." in [pre.text for pre in pages.get(client, "/docs/").all("pre")]
 
 
-def test_nothing_but_wheels_is_served(client: Client, benchmark: None, dist: Path) -> None:
+def test_nothing_but_wheels_and_examples_is_served(client: Client, benchmark: None, dist: Path) -> None:
     dist.with_name("secret.txt").write_text("secret")
     for name in ("secret.txt", "..%2Fsettings.py", f".{dist.name}", "tsttc-9-py3-none-any.whl"):
         assert client.get(f"/dist/{name}").status_code == 404
