@@ -31,8 +31,9 @@ KIT: Final[dict[str, tuple[str, ...]]] = {
 
 RESULTS: Final[dict[str, tuple[str, ...]]] = {
     "evaluator.client.answers": (
-        *("Account", "Board", "BoardEntry", "Compared", "ConfidenceInterval", "Foreseen", "Method", "Pair"),
-        *("Queue", "Quota", "Submission", "BadAnswer", "Refused", "TimedOut", "Unreachable"),
+        *("Account", "Board", "BoardEntry", "Compared", "ConfidenceInterval", "Method", "Pair"),
+        *("Queue", "Quota", "Submission", "VisibilityPreview"),
+        *("BadAnswer", "Refused", "TimedOut", "Unreachable"),
     ),
     "evaluator.metrics.protocol": ("TTCRange",),
     "evaluator.metrics.registry": ("Metric",),
