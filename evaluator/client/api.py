@@ -1,7 +1,7 @@
 """A client of the leaderboard's API, for a laptop or a CI job.
 
     with Client(url="https://example.org", token=token) as client:
-        submission = client.submit(data, filename="predictions.json", split="val", method="Foo++")
+        submission = client.submit("predictions.json", split="val", method="Foo++")
         for submission in client.watch(submission.id, timeout_s=600):
             print(submission.state)
 
@@ -22,6 +22,7 @@ from urllib.request import getproxies, proxy_bypass
 
 import httpx
 
+from evaluator.arguments import Source, data_of
 from evaluator.client.answers import (
     JSON,
     Account,
@@ -127,14 +128,15 @@ class Client:
 
     def submit(
         self,
-        data: bytes,
+        source: Source,
         *,
-        filename: str,
         split: str,
         method: str,
+        filename: str = "predictions.json",
         details: Mapping[str, str] | None = None,
     ) -> Submission:
         """Submit a prediction file; returns the new submission, or the first one of the same bytes."""
+        data = data_of(source)
         fields = {"split": split, "method": method, **(details or {})}
         n_sent = 0
 

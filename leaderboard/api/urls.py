@@ -17,7 +17,12 @@ from leaderboard.api import (
 )
 from leaderboard.http_caching import cacheable
 
+_TO_THE_REFERENCE = RedirectView.as_view(
+    pattern_name="api_reference", http_method_names=["get", "head", "options"]
+)
+
 urlpatterns = [
+    path("", _TO_THE_REFERENCE, name="api-root"),
     path("submissions", submission_views.SubmissionsView.as_view(), name="api-submissions"),
     path(
         "submissions/<uuid:submission_id>", submission_views.SubmissionView.as_view(), name="api-submission"
@@ -80,9 +85,5 @@ urlpatterns = [
         name="api-published-table",
     ),
     path("schema", schema.SchemaView.as_view(), name="api-schema"),
-    path(
-        "docs",
-        RedirectView.as_view(pattern_name="api_reference", http_method_names=["get", "head", "options"]),
-        name="api-docs",
-    ),
+    path("docs", _TO_THE_REFERENCE, name="api-docs"),
 ]

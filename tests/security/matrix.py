@@ -203,6 +203,7 @@ LINES: dict[str, Line] = {
     "api-edition-preview": line(GET=API_KEEPERS),
     "api-schema": line(GET=API_OPEN),
     "api-docs": line(GET=all_of("302")),
+    "api-root": line(GET=all_of("302")),
     # --- accounts (allauth): 302 sends those who are signed in on, and those who are not to the board ---
     "account_login": line(GET="200 302 302 302 302 200 200", POST="200 302 302 302 302 200 200"),
     "account_signup": line(GET="200 302 302 302 302 200 200", POST="200 302 302 302 302 200 200"),

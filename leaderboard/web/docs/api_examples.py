@@ -189,8 +189,7 @@ EXAMPLES: Final[Mapping[str, Example]] = {
         ),
         _send("POST", "submissions", form=_FORM),
         'tsttc submit predictions.json --split val --method "Deep TTC" --note "lr 1e-4" --wait',
-        'with open("predictions.json", "rb") as file:\n'
-        '    print(client.submit(file.read(), filename="predictions.json", split="val", method="Deep TTC"))',
+        'client.submit("predictions.json", split="val", method="Deep TTC")',
     ),
     "withdraw": Example(
         _send("POST", f"submissions/{SUBMISSION}/withdraw"),
