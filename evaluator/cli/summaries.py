@@ -70,17 +70,27 @@ def lines_of(summary: Summary, failure: Failure | None) -> Iterator[str]:
         if failure.hint:
             yield from (markdown(failure.hint), "")
     if submission is not None and submission.scores is not None:
-        if rank := rank_in_words(submission):
-            yield from (f"{rank[:1].upper()}{rank[1:]}", "")
-        yield from _table(submission)
-        yield from ("", units(submission.scores), "")
-        for verdict in summary.verdicts:
-            gate = verdict.gate.replace("`", "")
-            yield f"- `{gate}` {_WORDS[verdict.is_failing]}: {markdown(verdict.reason)}"
-        if summary.verdicts:
-            yield ""
+        yield from _scores(submission)
+        yield from _gates(summary.verdicts)
+    for warning in submission.warnings if submission is not None else ():
+        yield from (f"Warning: {markdown(warning.message)}", "")
     if summary.address:
         yield from (f"Submission: {markdown_address(summary.address)}", "")
+
+
+def _gates(verdicts: Sequence[Verdict]) -> Iterator[str]:
+    for verdict in verdicts:
+        gate = verdict.gate.replace("`", "")
+        yield f"- `{gate}` {_WORDS[verdict.is_failing]}: {markdown(verdict.reason)}"
+    if verdicts:
+        yield ""
+
+
+def _scores(submission: Submission) -> Iterator[str]:
+    if rank := rank_in_words(submission):
+        yield from (f"{rank[:1].upper()}{rank[1:]}", "")
+    yield from _table(submission)
+    yield from ("", units(submission.scores or {}), "")
 
 
 def _table(submission: Submission) -> Iterator[str]:

@@ -19,6 +19,7 @@ RESULT = SCORED | {
     "intervals": {"mid": {"low": 13.21, "high": 14.6, "rank_low": 1, "rank_high": 3}},
     "rank": 2,
     "counts": {"overall": 60},
+    "warnings": [{"code": "shuffled-values", "message": "The values look shuffled."}],
 }
 
 
@@ -45,6 +46,7 @@ def test_result_and_gates_are_appended(tsttc: Tsttc, site: RecordedSite, tmp_pat
     assert [line for line in lines if line.startswith("| 95 % | 13.21–14.60 | – |")]
     assert "- `--fail-if rte > 99` passes: rte is 14.00" in lines
     assert "- `--fail-if-worse-than Old` **fails**: MiD is 13.92, and Old has 13.00" in lines
+    assert "Warning: The values look shuffled." in lines
     assert lines[-2].startswith(f"Submission: <{site.url}/submissions/1/>")
 
 
