@@ -20,26 +20,6 @@ def as_floats(values: Any) -> Floats:
     return np.asarray(values, dtype=np.float64)
 
 
-def chosen_rows(chosen: Any, *, n_sequences: int) -> NDArray[np.intp]:
-    """The rows that a mask (n,) chooses, or that are given by their numbers.
-
-    Raises `ValueError` for a mask of another length, and for rows that are not there or named twice.
-    """
-    rows = np.asarray(chosen.detach().cpu() if hasattr(chosen, "detach") else chosen)
-    if rows.dtype == np.bool_:
-        if rows.shape != (n_sequences,):
-            raise ValueError(f"The mask has the shape {rows.shape}; expected ({n_sequences},).")
-        return np.flatnonzero(rows)
-    rows = rows.astype(np.intp, casting="safe") if rows.size else rows.astype(np.intp)
-    if (
-        rows.ndim != 1
-        or len(set(rows.tolist())) < len(rows)
-        or not ((rows >= 0) & (rows < n_sequences)).all()
-    ):
-        raise ValueError(f"Rows are whole numbers from 0 to {n_sequences - 1}, each once, or a mask.")
-    return rows
-
-
 def in_row_order(values: Any, *, name: str, anno_id: NDArray[np.int64] | None) -> Floats:
     """Copy one number per sequence, in the order of `anno_id` (the manifest's; None: any order).
 

@@ -14,10 +14,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from evaluator.arguments import Source, data_of, require
-from evaluator.arrays import as_floats, chosen_rows, in_row_order
+from evaluator.arrays import as_floats, in_row_order
 from evaluator.counting import counted, file_size
 from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
 from evaluator.predictions.alignment import KeyKind, read_slowly
@@ -110,10 +111,10 @@ class Predictions:
             seconds = dict(values) | seconds
         return cls.from_dict(seconds, manifest=manifest)
 
-    def subset(self, chosen: ArrayLike) -> Predictions:
-        """Those of the sequences that a mask (n,) or row numbers choose; raises `ValueError`."""
-        rows = chosen_rows(chosen, n_sequences=self.manifest.n_sequences)
-        return Predictions.from_arrays(ttc_s=self.ttc_s[rows], manifest=self.manifest.subset(rows))
+    def subset(self, rows: ArrayLike) -> Predictions:
+        """Return those of some sequences; raises as `GroundTruth.subset`."""
+        chosen = np.asarray(rows)
+        return Predictions.from_arrays(ttc_s=self.ttc_s[chosen], manifest=self.manifest.subset(chosen))
 
     def where(self, row: int) -> str:
         """Return the JSON pointer to the value of sequence `row`."""

@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from evaluator.arguments import Source
-from evaluator.arrays import chosen_rows
 from evaluator.metrics.protocol import TTCRange
 from evaluator.metrics.scale import Floats, exact_log, scale_ratio_10hz
 from evaluator.problems import Findings, quoted, reject
@@ -145,13 +144,13 @@ class Manifest:
             self.recordings, given=dict(zip(self.bag_stamp, self.unit, strict=bool(self.unit))), kind=kind
         )
 
-    def subset(self, chosen: ArrayLike) -> Manifest:
-        """The sequences that a mask (n,) or row numbers choose, with their anno_ids; raises `ValueError`."""
-        return Manifest.from_table(self.to_table().subset(self._rows(chosen)))
+    def subset(self, rows: ArrayLike) -> Manifest:
+        """Return some of the sequences, with their anno_ids: as `GroundTruth.subset`."""
+        return Manifest.from_table(self.to_table().subset(self._chosen(rows)))
 
-    def _rows(self, chosen: ArrayLike) -> list[int]:
-        rows: list[int] = chosen_rows(chosen, n_sequences=self.n_sequences).tolist()
-        return rows
+    def _chosen(self, rows: ArrayLike) -> list[int]:
+        chosen: list[int] = np.arange(self.n_sequences)[np.asarray(rows)].tolist()
+        return chosen
 
     def to_table(self) -> Table:
         """Return the columns as lists, without times to contact."""
@@ -249,13 +248,13 @@ class GroundTruth:
         inside = [each.contains(self.ttc_s) for each in ranges]
         return self.n_sequences - int(np.count_nonzero(np.logical_or.reduce(inside)))
 
-    def subset(self, chosen: ArrayLike) -> GroundTruth:
-        """The sequences that a mask (n,) or row numbers choose, as a fold of one's own.
+    def subset(self, rows: ArrayLike) -> GroundTruth:
+        """The ground truth of some sequences, such as a fold: a mask (n,) of bools, or rows in any order.
 
-        They keep their anno_ids; predictions of the whole are scored as `predictions.subset(chosen)`. Raises
-        `ValueError` for another shape, `Rejected` where none is chosen.
+        They keep their anno_ids; predictions of the whole are scored as `predictions.subset(rows)`. Raises
+        `IndexError` for rows that are not there, `Rejected` for none and for a row that comes twice.
         """
-        return GroundTruth.from_table(self.to_table().subset(self.manifest._rows(chosen)))
+        return GroundTruth.from_table(self.to_table().subset(self.manifest._chosen(rows)))
 
     def to_table(self) -> Table:
         """Return the columns as lists."""
