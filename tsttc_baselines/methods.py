@@ -65,7 +65,7 @@ class Method:
     boxes: Literal["pair", "target"] = "pair"
 
     def filled(self, given: Mapping[str, Value]) -> dict[str, Value]:
-        """Fill in defaults; raises `KeyError` for unknown names, `ValueError` for missing or infinite ones."""
+        """Fill in defaults; raises `KeyError` for unknown names, `ValueError` for missing or infinite."""
         known = {parameter.name: parameter.default for parameter in self.parameters}
         strangers = [name for name in given if name not in known]
         if strangers:

@@ -9,8 +9,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from evaluator import TTC_RANGES, evaluate, read_predictions, read_truth
 from evaluator.cli import own_commands
 from evaluator.cli.exits import Exit

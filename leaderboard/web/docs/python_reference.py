@@ -17,33 +17,39 @@ _MAX_WIDTH: Final = 88
 # The default of a dataclass's field, where it is written as a call.
 _FIELD: Final = re.compile(r"\bfield\((?:default=([\w.]+))?.*\)$")
 
-KIT: Final[dict[str, tuple[str, ...]]] = {
-    "tsttc_baselines.folders": ("read_folder", "SequenceFolder"),
-    "tsttc_baselines.images": ("ImageCache",),
-    "tsttc_baselines.clips": ("Clip",),
-    "tsttc_baselines.estimates": ("Estimator", "Estimate", "Unusable"),
-    "tsttc_baselines.methods": ("get_method", "Method", "Parameter"),
-    "tsttc_baselines.running": ("run_method", "Run"),
-    "tsttc_baselines.boxes": ("scale_ratio_of_boxes", "expand", "is_usable"),
-    "tsttc_baselines.deep_scale.weights": ("read_weights", "write_weights", "Weights"),
+SECTIONS: Final[dict[str, dict[str, tuple[str, ...]]]] = {
+    "results of evaluator": {
+        "evaluator.client.answers": (
+            *("Account", "Board", "BoardEntry", "Compared", "ConfidenceInterval", "Method", "Pair"),
+            *("Queue", "Quota", "Submission", "VisibilityPreview"),
+            *("BadAnswer", "Refused", "TimedOut", "Unreachable"),
+        ),
+        "evaluator.metrics.protocol": ("TTCRange",),
+        "evaluator.metrics.registry": ("Metric",),
+        "evaluator.problems": ("FileWarning",),
+        "evaluator.scoring.results": ("GroupScores",),
+        "evaluator.truth.numbering": ("Numbering",),
+        "evaluator.truth.objects": ("Objects",),
+        "evaluator.units": ("Units",),
+    },
+    "with torch": {
+        "evaluator.torch": ("ScoreMetric",),
+        "evaluator.lightning": ("ScoreCallback",),
+        "tsttc_baselines.torch": ("BoxCrops", "crops_of", "crops_of_clip"),
+    },
+    "starter kit": {
+        "tsttc_baselines.folders": ("read_folder", "read_folder_truth", "SequenceFolder"),
+        "tsttc_baselines.images": ("ImageCache",),
+        "tsttc_baselines.clips": ("Clip",),
+        "tsttc_baselines.estimates": ("Estimator", "Estimate", "Unusable"),
+        "tsttc_baselines.methods": ("get_method", "Method", "Parameter"),
+        "tsttc_baselines.own_methods": ("find_method",),
+        "tsttc_baselines.running": ("run_method", "Run"),
+        "tsttc_baselines.boxes": ("scale_ratio_of_boxes", "expand", "is_usable"),
+        "tsttc_baselines.deep_scale.weights": ("read_weights", "write_weights", "Weights"),
+    },
 }
-"""The public names of the starter kit by their modules, which is how they are imported."""
-
-RESULTS: Final[dict[str, tuple[str, ...]]] = {
-    "evaluator.client.answers": (
-        *("Account", "Board", "BoardEntry", "Compared", "ConfidenceInterval", "Method", "Pair"),
-        *("Queue", "Quota", "Submission", "VisibilityPreview"),
-        *("BadAnswer", "Refused", "TimedOut", "Unreachable"),
-    ),
-    "evaluator.metrics.protocol": ("TTCRange",),
-    "evaluator.metrics.registry": ("Metric",),
-    "evaluator.problems": ("FileWarning",),
-    "evaluator.scoring.results": ("GroupScores",),
-    "evaluator.truth.numbering": ("Numbering",),
-    "evaluator.truth.objects": ("Objects",),
-    "evaluator.units": ("Units",),
-}
-"""What the functions of `evaluator` give, and is not imported from it."""
+"""By the titles of the page: public names beside those of `evaluator` itself, by their modules."""
 
 _Definition = ast.FunctionDef | ast.ClassDef
 
@@ -53,7 +59,7 @@ def text() -> str:
     parts = ["## Reference: evaluator", "", "Import these names from `evaluator`.", ""]
     for name, module in sorted(_homes().items(), key=lambda each: each[0].lower()):
         parts += _entry(name, module, shown=f"evaluator.{name}")
-    for title, modules in (("results of evaluator", RESULTS), ("starter kit", KIT)):
+    for title, modules in SECTIONS.items():
         parts += [f"## Reference: {title}", "", "Each name belongs to the module before it.", ""]
         for module, names in modules.items():
             for name in names:

@@ -12,8 +12,8 @@ ENTRIES = dict(re.findall(r"^### (\S+)\n(.*?)(?=^##|\Z)", TEXT, re.MULTILINE | r
 
 def test_every_public_name_is_there_with_words() -> None:
     expected = {f"evaluator.{name}" for name in evaluator.__all__ if name != "__version__"}
-    further = {**python_reference.KIT, **python_reference.RESULTS}
-    expected |= {f"{module}.{name}" for module, names in further.items() for name in names}
+    for modules in python_reference.SECTIONS.values():
+        expected |= {f"{module}.{name}" for module, names in modules.items() for name in names}
     assert set(ENTRIES) == expected
     words = {
         name: re.sub(r"```.*?```", "", entry, flags=re.DOTALL).strip() for name, entry in ENTRIES.items()
