@@ -23,8 +23,8 @@ from tests.leaderboard.web.test_every_page import assert_sound
 pytestmark = pytest.mark.slow
 
 SITE = "https://board.example.org"
-# Code, tables of the paper, weights, and the mark of typed packages.
-SUFFIXES = {"py", "json", "npz", "typed"}
+# Code, tables of the paper, weights, what `tsttc new-method` writes, and the mark of typed packages.
+SUFFIXES = {"py", "json", "npz", "txt", "typed"}
 
 
 @pytest.fixture(scope="module")
