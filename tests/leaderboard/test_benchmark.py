@@ -124,6 +124,11 @@ def test_a_new_installation_begins_with_the_splits_of_the_file(
             '[[splits]]\nname = "a"\ntitle = "A"\n[paper]',
             "default_split is 'test'; expected one of a",
         ),
+        (
+            "[paper]",
+            '[[splits]]\nname = "test"\ntitle = "A"\n[paper]\nhas_tables = true',
+            "paper.has_tables is True; expected false, or splits for the results of its tables, also val.",
+        ),
     ],
 )
 def test_a_fault_is_named_with_file_key_and_expectation(
