@@ -38,7 +38,9 @@ url = "https://example.org/paper"
 bibtex = "@article{lovelace2030, title = {Events}}"
 """
 # Names of variables and of addresses are those of the software.
-OURS = re.compile(r"TSTTC(?!_)|shi2023|2309\.01539|tusen-ai|Large-Scale Dataset|How long until contact")
+OURS = re.compile(
+    r"TSTTC(?!_)|shi2023|2309\.01539|tusen-ai|Large-Scale Dataset|How long until contact|The paper’s"
+)
 # Guides are documents of the software, and so are the recorded answers that quote our paper.
 DOCUMENTS = re.compile(r"/docs/(?!api/).|/docs/api/(list_published_tables|published_table|croissant)/")
 API = ("splits", "splits/test/board", "splits/test/editions", "splits/test/changelog", "published")
