@@ -92,6 +92,7 @@ def test_nothing_that_is_shown_of_a_split_says_what_its_protocol_does_not_have(
     assert "(0, 5] s" in text["/board/test/"]
     assert "RTE, % (log scale)" in text["/board/test/charts/"]
     assert "Protocol others-1" in text["/docs/"]
+    assert "--protocol others-1" in text["/docs/"]
     assert "−30 s or 30 s." in text["/docs/"]
 
 
