@@ -12,6 +12,8 @@ from typing import Annotated, Any, Final
 import msgspec
 from django.core.exceptions import ImproperlyConfigured
 
+from evaluator.papers.tables import published_tables
+
 DEFAULT_PATH: Final = Path(__file__).with_name("benchmark.toml")
 _STATIC: Final = Path(__file__).parents[1] / "static"
 _BIBTEX: Final = re.compile(r"\s*@\w+\{([^\s,{}]+),")
@@ -152,6 +154,11 @@ def _faults(benchmark: Benchmark) -> Iterator[tuple[str, object, str]]:
         yield "default_split", benchmark.default_split, f"one of {', '.join(names)}"
     if benchmark.paper is not None and not benchmark.paper.bibtex_key:
         yield "paper.bibtex", benchmark.paper.bibtex[:60], "an entry such as @misc{key, …}"
+    if benchmark.has_paper_tables:
+        quoted = {row.split for table in published_tables().tables for row in table.rows if row.split}
+        if missing := sorted(quoted.difference(names)):
+            expected = f"false, or splits for the results of its tables, also {' and '.join(missing)}"
+            yield "paper.has_tables", True, expected
     if benchmark.figure is not None:
         for key in ("wide_light", "wide_dark", "narrow_light", "narrow_dark", "card"):
             name = getattr(benchmark.figure, key)

@@ -58,7 +58,7 @@ protocol_option = default_option(
     "--protocol",
     type=click.Choice(list(PROTOCOLS)),
     default=DEFAULT_PROTOCOL,
-    help="Protocol: tsttc-1 as on the board; toolkit gives the numbers of the dataset's toolkit to the bit.",
+    help="Protocol: that of the board; toolkit gives the numbers of the dataset's toolkit to the bit.",
 )
 
 

@@ -61,13 +61,12 @@ def _board(split: Split, edition: Edition | None, written: Files) -> dict[str, A
     board = listing.board(split=split, edition=edition, viewer=AnonymousUser())
     address = absolute("edition", split.pk, edition.number) if edition else absolute("board", split.pk)
     stem = f"boards/{split.pk}/{f'edition-{edition.number}' if edition else 'quoted'}"
-    links = {each.title: f"{stem}.{each.suffix}" for each in tables.offered()}
+    answer = _json(BoardSerializer(board, context={"has_intervals": True}).data)
+    links: dict[str, str] = {}
     for each in tables.offered():
-        if each.write is None:
-            written[links[each.title]] = _json(BoardSerializer(board, context={"has_intervals": True}).data)
-        else:
-            export = tables.export(board, address=address, has_intervals=each.has_values)
-            written[links[each.title]] = each.write(export).encode()
+        links[each.title] = name = f"{stem}.{each.suffix}"
+        export = tables.export(board, address=address, has_intervals=each.has_values)
+        written[name] = each.write(export).encode() if each.write else answer
     if edition is not None:
         links["Manifest"] = files.manifest_name(edition.ground_truth.manifest_digest)
         with files.store().open(links["Manifest"], "rb") as file:

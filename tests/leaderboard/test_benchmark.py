@@ -38,7 +38,9 @@ url = "https://example.org/paper"
 bibtex = "@article{lovelace2030, title = {Events}}"
 """
 # Names of variables and of addresses are those of the software.
-OURS = re.compile(r"TSTTC(?!_)|shi2023|2309\.01539|tusen-ai|Large-Scale Dataset|How long until contact")
+OURS = re.compile(
+    r"TSTTC(?!_)|shi2023|2309\.01539|tusen-ai|Large-Scale Dataset|How long until contact|The paper’s"
+)
 # Guides are documents of the software, and so are the recorded answers that quote our paper.
 DOCUMENTS = re.compile(r"/docs/(?!api/).|/docs/api/(list_published_tables|published_table|croissant)/")
 API = ("splits", "splits/test/board", "splits/test/editions", "splits/test/changelog", "published")
@@ -123,6 +125,11 @@ def test_a_new_installation_begins_with_the_splits_of_the_file(
             "[paper]",
             '[[splits]]\nname = "a"\ntitle = "A"\n[paper]',
             "default_split is 'test'; expected one of a",
+        ),
+        (
+            "[paper]",
+            '[[splits]]\nname = "test"\ntitle = "A"\n[paper]\nhas_tables = true',
+            "paper.has_tables is True; expected false, or splits for the results of its tables, also val.",
         ),
     ],
 )

@@ -8,7 +8,7 @@ from typing import Any, Final
 from django.conf import settings
 
 from evaluator.counting import file_size
-from evaluator.metrics.protocol import PROTOCOLS, Protocol
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PROTOCOLS, Protocol
 from evaluator.problems import PROBLEM_CODES
 from leaderboard.boards import listing
 from leaderboard.models import Split
@@ -58,6 +58,7 @@ def docs(splits: Sequence[Split], *, now: datetime) -> dict[str, Any]:
         "has_manifest": example is not None,
         "is_open": example is not None and admissions.is_open(example, now=now),
         "protocol": protocol,
+        "default_protocol": DEFAULT_PROTOCOL,
         "limit": f"{protocol.limit_s:g}",
         "has_open_ends": len(ends) < 2 * len(protocol.ranges),
         "shared_end": next((f"{end:g}" for end in ends if ends.count(end) > 1), ""),

@@ -26,9 +26,9 @@ OF_OTHERS = Protocol(
     "others-1", limit_s=30.0, near_zero_s=None, ranges=(APPROACHING, LEAVING), metrics=(RTE,)
 )
 WRONG = re.compile(r"\bMiD\b|(?i:motion-in-depth)|\bmid\b|mid_|crucial|0–3|(?i:ten (?:numbers|scores))|10⁻⁴")
-# The paper's own tables, guides about TSTTC, what the API has for all protocols, and other splits.
+# The paper's own tables, guides about TSTTC, what the API has for all protocols, the wheel, and other splits.
 ELSEWHERE = re.compile(
-    r"^/(maintain/)?published|^/docs/(?!$)|^/api/v1/(published|schema|docs)|/(val|demo)\b|^/maintain/audit|=(val|demo)\b"
+    r"^/(maintain/)?published|^/docs/(?!$)|^/dist/.|^/api/v1/(published|schema|docs)|/(val|demo)\b|^/maintain/audit|=(val|demo)\b"
 )
 
 
@@ -92,6 +92,7 @@ def test_nothing_that_is_shown_of_a_split_says_what_its_protocol_does_not_have(
     assert "(0, 5] s" in text["/board/test/"]
     assert "RTE, % (log scale)" in text["/board/test/charts/"]
     assert "Protocol others-1" in text["/docs/"]
+    assert "--protocol others-1" in text["/docs/"]
     assert "−30 s or 30 s." in text["/docs/"]
 
 
