@@ -18,7 +18,7 @@ _DIGEST: Final = re.compile(r"(sha256:[0-9a-f]{8})[0-9a-f]{56}")
 _MOMENT: Final = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d):\d\d(?:\.\d+)?\+00:00")
 # In `before → after`, as a change of a split is kept.
 _PYTHON: Final = re.compile(r"(?<=→ )(?:None|True|False)$|^(?:None|True|False)(?= →)")
-_SAID: Final = {"None": "none", "True": "yes", "False": "no"}
+_WORDS: Final = {"None": "none", "True": "yes", "False": "no"}
 _VERBS: Final = {
     "shown": "visibility changed",
     "revealed": "made public on its day",
@@ -107,7 +107,7 @@ def _words(value: Any) -> str:
         n_more = len(value) - MAX_LISTED
         more = f" and {n_more:,} more" if n_more > 0 else ""
         return ", ".join(str(each).replace("_", " ") for each in value[:MAX_LISTED]) + more
-    text = "" if value is None else _PYTHON.sub(lambda match: _SAID[match[0]], str(value))
+    text = "" if value is None else _PYTHON.sub(lambda match: _WORDS[match[0]], str(value))
     if text.isupper():  # a choice, as PRIVATE
         return text.lower()
     return _MOMENT.sub(r"\1 \2 UTC", _DIGEST.sub(r"\1…", text))
@@ -124,14 +124,14 @@ def _subjects(events: Iterable[AuditEvent]) -> dict[tuple[str, str], Subject]:
         for name in ("user", "team", "from", "to"):
             if name in event.details:
                 ids["User" if name == "user" else "Team"].add(str(event.details[name]))
-    found: dict[tuple[str, str], Subject] = {}
+    subjects: dict[tuple[str, str], Subject] = {}
     for noun, (model, related, subject_of) in _TABLES.items():
         keys = [key for key in ids[noun] if _is_key(model, key)]
         if keys:
             rows = model._default_manager.filter(pk__in=keys).select_related(*related)
-            found |= {(noun, str(row.pk)): subject_of(row) for row in rows}
+            subjects |= {(noun, str(row.pk)): subject_of(row) for row in rows}
     pages = ids["Page"] & set(PAGES)
-    return found | {
+    return subjects | {
         ("Page", name): Subject(PAGES[name].title, reverse("maintain_page", args=[name])) for name in pages
     }
 

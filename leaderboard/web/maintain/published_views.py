@@ -36,7 +36,7 @@ def remove(request: HttpRequest, split: str, slug: str) -> HttpResponse:
 
 @maintainers_form
 def published(request: HttpRequest) -> HttpResponse:
-    """Show the rows, and a form for one row beside one for a document; the button says which was sent."""
+    """Show the rows, and a form for one row and one for a document; the button says which was sent."""
     is_row = request.POST.get("step") == "row"
     sent = (request.POST, request.FILES) if request.method == "POST" else (None, None)
     row_form = RowForm(sent[0] if is_row else None, prefix="row")

@@ -53,13 +53,17 @@ def test_ranks_of_another_edition_and_boards_of_the_past_have_not_moved(months: 
 
 def test_page_tells_what_is_new_and_what_has_moved(months: list[Method], client: Client) -> None:
     root = pages.get(client)
-    new = [row for row in root.one("tbody").all("tr") if row.all("span", class_="new")]
+    new = [
+        row
+        for row in root.one("table", class_="board").one("tbody").all("tr")
+        if row.all("span", class_="new")
+    ]
     assert {row.one("div", class_="name").text for row in new} == {f"{each.name} new" for each in months[6:]}
     moved = movement.moved(board_of(), now=timezone.now())
-    marks = [each.text for each in root.one("tbody").all("span", class_="moved")]
+    marks = [each.text for each in root.one("table", class_="board").one("tbody").all("span", class_="moved")]
     assert len(marks) == sum(1 for each in moved.values() if each)
     assert all("in a month" in text for text in marks)
     Submission.objects.update(submitted_at=timezone.now())
     Method.objects.update(shown_at=timezone.now())
     builders.board_changed("test")
-    assert pages.get(client).one("tbody").all("span", class_="new") == [], "of most rows it says nothing"
+    assert pages.get(client).one("table", class_="board").one("tbody").all("span", class_="new") == [], "of most rows it says nothing"
