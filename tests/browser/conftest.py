@@ -1,6 +1,5 @@
 """One site for all tests in a browser, and a browser for each module of them."""
 
-import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from urllib.parse import urlsplit
@@ -114,7 +113,7 @@ def sign_up(page: Page, *, email: str, name: str) -> None:
 def submit(page: Page, data: bytes, *, method: str, split: str = "test") -> None:
     """Send a file through the form; the page is the submission's afterwards."""
     page.goto("/submit/")
-    page.get_by_role("radio", name=re.compile(rf"^{split}\b")).check()
+    page.locator(f"input[name=split][value={split}]").check()
     page.get_by_label("Method", exact=True).fill(method)
     page.get_by_label("Prediction file").set_input_files(
         {"name": "predictions.json", "mimeType": "application/json", "buffer": data}

@@ -56,7 +56,7 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     press("Enter")
     page.wait_for_url("**/submit/")
     # Chosen already where it is the only one that is open; which splits are is for other tests to say.
-    tab_to(page, "test The hidden test set: the numbers that papers quote.")
+    tab_to(page, "Test The hidden test set: the numbers that papers quote.")
     press("Space")
     tab_to(page, "Method")
     write("By keyboard")
@@ -141,14 +141,14 @@ def test_a_file_dropped_on_the_form_is_chosen_and_beside_it_is_not_opened(
     assert not is_left_to_the_browser
     expect(page.locator("#chosen")).to_have_text("")
     # Chosen already where it is the only split that is open.
-    page.get_by_role("radio", name=re.compile(r"^test\b")).check()
+    page.locator("input[name=split][value=test]").check()
     page.evaluate(DROP, ["legend", "dragover"])
     expect(page.locator("form.dropping")).to_be_visible()
     page.evaluate(DROP, ["legend", "drop"])
     expect(page.locator("#chosen")).to_have_text("2 bytes")
     assert page.evaluate("document.querySelector('input[type=file]').files[0].name") == "mine.json"
     expect(page.locator("form.dropping")).to_have_count(0)
-    expect(page.locator("#checked")).to_contain_text("The file has 0 predictions; test expects 1,200")
+    expect(page.locator("#checked")).to_contain_text("The file has 0 predictions; Test expects 1,200")
 
 
 def test_a_file_is_checked_before_it_is_sent_and_what_was_filled_in_stays(
@@ -164,10 +164,10 @@ def check_and_correct(page: Page, truth: evaluator.GroundTruth) -> None:
     sent: list[str] = []
     page.on("request", lambda request: sent.append(request.method))
     field = page.get_by_label("Prediction file")
-    page.get_by_role("radio", name=re.compile(r"^test\b")).check()
+    page.locator("input[name=split][value=test]").check()
     page.get_by_label("Method", exact=True).fill("Checked")
     with page.expect_download() as taken:
-        page.get_by_role("link", name="Template of test").click()
+        page.get_by_role("link", name="template (JSON) of Test").click()
     field.set_input_files(taken.value.path())
     expect(page.locator("#checked .bad")).to_have_text(
         "This is the empty template: all 1,200 values are null; expected a number for every sequence. "
@@ -193,7 +193,7 @@ def check_and_correct(page: Page, truth: evaluator.GroundTruth) -> None:
 
 LEFT_TO_THE_SERVER = "The server checks {} once it is sent."
 REJECTED = "The server would reject the file."
-ANOTHER_NUMBER = "test expects 1,200, one for each sequence. The server would reject the file."
+ANOTHER_NUMBER = "Test expects 1,200, one for each sequence. The server would reject the file."
 ONE_LESS = json.dumps({str(row): 2.5 for row in range(1_199)}).encode()
 SENTENCES: dict[str, tuple[bytes, str]] = {
     "nothing": (b" ", f"The file is empty; expected JSON text with a number for every sequence. {REJECTED}"),
@@ -222,7 +222,7 @@ def test_a_file_that_cannot_be_good_is_named_before_it_is_sent(
     page: Page, site: Site, truth: evaluator.GroundTruth
 ) -> None:
     sign_up(page, email="sentences@example.org", name="Sentences")
-    page.get_by_role("radio", name=re.compile(r"^test\b")).check()
+    page.locator("input[name=split][value=test]").check()
     for data, sentence in SENTENCES.values():
         chosen = {"name": "p.json", "mimeType": "application/json", "buffer": data}
         page.get_by_label("Prediction file").set_input_files(chosen)
@@ -244,7 +244,7 @@ def test_a_warning_that_comes_after_submit_was_pressed_gets_the_focus(
     sign_up(page, email="focus@example.org", name="Focus")
     sent: list[str] = []
     page.on("request", lambda request: sent.append(request.method))
-    page.get_by_role("radio", name=re.compile(r"^test\b")).check()
+    page.locator("input[name=split][value=test]").check()
     page.get_by_label("Method", exact=True).fill("Pressed early")
     page.evaluate(SLOW_READING)
     chosen = {"name": "p.json", "mimeType": "application/json", "buffer": ONE_LESS}
@@ -290,7 +290,7 @@ def test_file_over_the_limit_is_stopped_before_it_is_sent(page: Page, truth: eva
 
 def test_form_outlives_a_session_that_has_ended(page: Page, site: Site, truth: evaluator.GroundTruth) -> None:
     sign_up(page, email="late@example.org", name="Late")
-    page.get_by_role("radio", name=re.compile(r"^test\b")).check()
+    page.locator("input[name=split][value=test]").check()
     page.get_by_label("Method", exact=True).fill("Late net")
     page.get_by_label("Prediction file").set_input_files(
         {"name": "p.json", "mimeType": "application/json", "buffer": predictions(truth, factor=1.07)}

@@ -99,11 +99,11 @@ def strike_words(evaluation: Evaluation) -> str:
     """Count failed runs by cause; empty if none failed.
 
     >>> strike_words(Evaluation(n_poison_strikes=2))
-    'poison 2 of 3'
+    'file 2 of 3'
     """
     strikes = (
-        ("poison", evaluation.n_poison_strikes, MAX_POISON_STRIKES),
-        ("infrastructure", evaluation.n_infrastructure_strikes, MAX_INFRASTRUCTURE_STRIKES),
+        ("file", evaluation.n_poison_strikes, MAX_POISON_STRIKES),
+        ("system", evaluation.n_infrastructure_strikes, MAX_INFRASTRUCTURE_STRIKES),
     )
     return ", ".join(f"{kind} {n} of {most}" for kind, n, most in strikes if n)
 

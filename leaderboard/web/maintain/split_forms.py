@@ -83,13 +83,13 @@ class PolicyForm(QuotaRulesForm):
         help_text="Decimals of its next edition. Each decimal reveals more of hidden values.",
     )
     needs_admission = forms.BooleanField(
-        label="By admission", required=False, help_text="Only admitted teams submit to it."
+        label="Restricted", required=False, help_text="Only admitted teams can submit."
     )
     how_to_be_admitted = forms.CharField(
-        label="How a team asks for admission",
+        label="How to request access",
         required=False,
         max_length=300,
-        help_text="The end of a sentence, such as: write to board@example.org.",
+        help_text="Ends the sentence that teams read, such as: write to board@example.org.",
     )
 
     def sections(self) -> list[tuple[str, list[forms.BoundField]]]:
@@ -120,7 +120,7 @@ class NewSplitForm(PolicyForm):
 
     name = forms.CharField(
         max_length=32,
-        help_text="Small letters, digits and hyphens. It stands in addresses and cannot be changed.",
+        help_text="Small letters, digits and hyphens. Used in URLs; permanent.",
         error_messages={"required": "No name was given; expected one like challenge-2027."},
         widget=forms.TextInput(attrs={"autocomplete": "off"}),
     )

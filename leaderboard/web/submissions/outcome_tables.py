@@ -116,15 +116,13 @@ def rejected_sentence(quota: Quota | None) -> str:
 
     >>> from leaderboard.models import QuotaOverride
     >>> rejected_sentence(Quota("test", QuotaOverride(quota_rejected_limit=20), 0, 3, True, None, ""))
-    'Your quota is not used. Up to 20 files may be rejected within 24 hours; 17 are left.'
+    'This didn’t count against your quota. 17 more files may be rejected within 24 hours.'
     """
     if quota is None:
         return ""
     limit = quota.rules.quota_rejected_limit
     if limit is None:
-        return "Your quota is not used."
+        return "This didn’t count against your quota."
     n_left = max(0, limit - quota.n_rejected)
-    return (
-        f"Your quota is not used. Up to {counted(limit, 'file')} may be rejected within 24 hours; "
-        f"{counted(n_left, 'is', 'are')} left."
-    )
+    more = counted(n_left, "more file")
+    return f"This didn’t count against your quota. {more} may be rejected within 24 hours."

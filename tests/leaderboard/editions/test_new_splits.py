@@ -89,7 +89,7 @@ def test_a_challenge_shares_ground_truth_and_has_its_own_deadline_quota_and_boar
     # The method is on one board, and the slot was one of the challenge's.
     test_rows = client.get("/api/v1/splits/test/board").json()["entries"]
     assert "Foo" not in [row["method"] for row in test_rows]
-    with pytest.raises(Exception, match="Your team has used 1 submission to challenge, its quota for 7 days"):
+    with pytest.raises(Exception, match="Your team has used 1 submission to Challenge, its quota for 7 days"):
         builders.send(owner, builders.predictions(edition, factor=1.2), split="challenge")
     builders.send(owner, builders.predictions(edition, factor=1.2), split="test")
     same_truth_as = {each["split"]: each["same_truth_as"] for each in client.get("/api/v1/splits").json()}

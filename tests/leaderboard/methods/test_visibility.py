@@ -207,7 +207,14 @@ def test_page_shows_what_others_will_see_asks_and_shows_it(
     address = link.attributes["href"]
     assert "I know that this cannot be undone" not in pages.page(client.get(address)).one("main").text
     main = pages.page(client.get(address, {"visibility": "PUBLIC"})).one("main").text
-    for words in ("Secret sauce", "Owls", "rank 1 of 6", "1 attempt:", "This cannot be undone:", "12.5"):
+    for words in (
+        "Secret sauce",
+        "Owls",
+        "rank 1 of 6",
+        "Attempts shown: 1 (",
+        "This cannot be undone:",
+        "12.5",
+    ):
         assert words in main
     masked = pages.page(client.get(address, {"visibility": "ANONYMOUS"})).one("section").text
     assert method.pseudonym in masked

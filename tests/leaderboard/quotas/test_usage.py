@@ -103,7 +103,7 @@ def test_two_submissions_are_apart_by_the_gap(edition: Edition, owner: User) -> 
     with pytest.raises(QuotaExceeded) as caught:
         send(owner, other(edition, 2), at=NOW + 23 * HOUR)
     assert str(caught.value) == (
-        "Submissions of a team to test must be at least 24 hours apart; "
+        "Submissions of a team to Test must be at least 24 hours apart; "
         "the next slot opens at 2026-11-21 12:01 UTC."
     )
     assert caught.value.quota.left == 2
@@ -147,7 +147,7 @@ def test_cancelling_gives_no_end_of_files_that_are_kept(edition: Edition, owner:
     for number in range(3):
         submission = send(owner, other(edition, number)).submission
         intake.withdraw(submission=submission, actor=owner, now=NOW)
-    with pytest.raises(QuotaExceeded, match="reached its limit for test: within 24 hours, 3 files"):
+    with pytest.raises(QuotaExceeded, match="reached its limit for Test: within 24 hours, 3 files"):
         send(owner, other(edition, 3))
     assert (state(owner).left, state(owner).n_rejected, state(owner).next_slot_at) == (1, 3, NOW + DAY)
     assert send(owner, other(edition, 3), at=NOW + DAY).is_new
@@ -186,7 +186,7 @@ def test_rejected_files_have_a_limit_of_their_own(edition: Edition, owner: User)
     with pytest.raises(QuotaExceeded) as caught:
         send(owner, other(edition, 1), at=NOW + 2 * HOUR)
     assert str(caught.value) == (
-        "Your team has reached its limit for test: within 24 hours, 2 files that were rejected, were "
+        "Your team has reached its limit for Test: within 24 hours, 2 files that were rejected, were "
         "cancelled, or stopped the process that read them; "
         "the next slot opens at 2026-11-21 12:00 UTC."
     )

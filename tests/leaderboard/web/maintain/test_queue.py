@@ -85,7 +85,7 @@ def test_what_failed_says_why_when_and_after_how_many_tries(keeper: Client, fail
     [row] = rows(get(keeper, QUEUE), "System errors")
     assert failed.finished_at is not None
     assert row[0] == f"{failed.finished_at:%Y-%m-%d %H:%M} UTC"
-    expected = ["Foo private", "Owls", "owner@example.org", "test", "1", "live", "3", "poison 3 of 3", REASON]
+    expected = ["Foo private", "Owls", "owner@example.org", "test", "1", "live", "3", "file 3 of 3", REASON]
     assert row[1:10] == expected
 
 
@@ -121,7 +121,7 @@ def test_what_waits_after_a_strike_says_when_it_is_due_and_what_ended_it(
     due_at = timezone.now() + timedelta(seconds=40)
     Evaluation.objects.filter(pk=waiting.pk).update(due_at=due_at)
     [row] = rows(get(keeper, QUEUE), "Waiting")
-    assert row[-4:] == ["1", "infrastructure 1 of 10", f"{due_at:%H:%M:%S}", "the disk failed"]
+    assert row[-4:] == ["1", "system 1 of 10", f"{due_at:%H:%M:%S}", "the disk failed"]
 
 
 def test_rows_say_what_makes_them_matter_less(keeper: Client, failed: Evaluation) -> None:

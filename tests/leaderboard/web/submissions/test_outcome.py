@@ -158,7 +158,7 @@ def test_latex_row_is_that_of_the_boards_table(signed_in: Client, inferred: list
 
 
 @pytest.mark.parametrize(
-    ("limit", "left"), [(20, ". Up to 20 files may be rejected within 24 hours; 19 are left."), (None, ".")]
+    ("limit", "left"), [(20, ". 19 more files may be rejected within 24 hours."), (None, ".")]
 )
 def test_rejected_file_uses_no_quota_and_page_says_how_many_more_are_taken(
     signed_in: Client, edition: Edition, owner: User, limit: int | None, left: str
@@ -167,7 +167,7 @@ def test_rejected_file_uses_no_quota_and_page_says_how_many_more_are_taken(
     sent = builders.submit(owner, b"[]")
     builders.score_all()
     assert (
-        f"Rejected: not scored. Your quota is not used{left} Correct"
+        f"Rejected: not scored. This didn’t count against your quota{left} Correct"
         in look(signed_in, sent).one("main").text
     )
 

@@ -140,7 +140,7 @@ def test_result_has_the_papers_columns_the_counts_and_the_truncations(
     assert [value.split()[0] for value in values] == [scores[f"mid-{i}"] for i in names]
     assert counts[0] == str(builders.N_SEQUENCES)
     assert "truncated" in root.one("main").text
-    assert "1 sequence in no TTC range counts in the overall scores only" in root.one("main").text
+    assert "1 sequence outside all TTC ranges counts only in the overall scores" in root.one("main").text
 
 
 def test_problems_are_numbered_with_position_and_total(
