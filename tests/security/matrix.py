@@ -102,7 +102,8 @@ LINES: dict[str, Line] = {
     "submission_state": line(GET="in 404 286 286 286 in in"),
     # Hidden splits have none, whoever asks.
     "analysis": line(GET="in 404 404 404 404 in in"),
-    "withdraw": line(GET=TEAM, POST="in 404 302 302 404 in in"),
+    # Without its tick nothing is withdrawn.
+    "withdraw": line(GET=TEAM, POST="in 404 422 422 404 in in"),
     "receipt": line(GET=TEAM),
     "receipt_keys": line(GET=OPEN),
     # Sent without a field, an edit changes nothing; showing a method needs to be said.
