@@ -57,7 +57,9 @@ def test_a_guide_asks_the_database_for_nothing_and_is_compressed(
 def test_a_visitor_finds_the_empty_template_in_the_docs_and_a_way_on_from_a_missing_page(
     client: Client, edition: Edition
 ) -> None:
-    assert pages.get(client, "/docs/").all("a", href="/submit/template/test.json") != []
+    docs = pages.get(client, "/docs/")
+    assert docs.all("a", href="/submit/template/test.json") != []
+    assert "A sequence at exactly 3 s or 6 s counts in two TTC ranges" in docs.text
     missing = pages.read(client.get("/nowhere/").text).one("main")
     assert missing.one("form").attributes["action"] == "/docs/search/"
     assert {"/board/test/", "/board/val/"} <= {a.attributes["href"] for a in missing.all("a")}
