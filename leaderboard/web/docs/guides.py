@@ -31,7 +31,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Prediction files": "file-format",
         "Command line": "cli",
         "Python": "python",
-        "From CI": "ci",
+        "CI": "ci",
         "API": "api-guide",
         "API reference": "",
         "Exports": "exports",
