@@ -34,10 +34,10 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "not-json": "The text is not JSON.",
     "wrong-top-level": "The outermost value, or `predictions`, is not an object.",
     "unknown-field": "The envelope has a field that the format does not know.",
-    "unknown-unit": 'The envelope\'s `unit` is absent or neither "ttc" nor "scale_ratio".',
+    "unknown-unit": 'The envelope\'s `unit` is missing or neither "ttc" nor "scale_ratio".',
     "missing-predictions": "The envelope has no `predictions`.",
-    "bad-rate": "`fps` or `frame_gap` is absent, doubled, not wanted, or no valid rate.",
-    "bad-meta": "`meta` is not a plain JSON object of moderate size.",
+    "bad-rate": "`fps` or `frame_gap` is missing, duplicated, unexpected or invalid.",
+    "bad-meta": "`meta` is not a plain JSON object of at most 64 KiB.",
     "missing-keys": (
         "Sequences of the manifest have no prediction; or a correction added them after the file was sent."
     ),

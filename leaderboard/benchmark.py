@@ -29,10 +29,11 @@ class _Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Landing(_Table, frozen=True):
-    """The words with which the landing page begins."""
+    """The words with which the landing page begins; each of its facts is a number and what it counts."""
 
     heading: Text
     text: Text
+    facts: tuple[tuple[Text, Text], ...] = ()
 
 
 class Dataset(_Table, frozen=True):

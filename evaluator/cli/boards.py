@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 )
 @click.option("--mine", is_flag=True, help="Include the private and anonymous methods of your team, marked.")
 @click.option(
-    "--intervals", "has_intervals", is_flag=True, help="Show the 95 % confidence interval of each value."
+    "--intervals", "has_intervals", is_flag=True, help="Show the 95% confidence interval of each value."
 )
 @click.option(
     "--edition",

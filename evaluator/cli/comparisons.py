@@ -69,7 +69,7 @@ def compare(
 ) -> None:
     """Compare FIRST with SECOND, methods of a board by name or id, or with --truth two prediction files.
 
-    Each column shows the difference, its 95 % confidence interval and the p-value of a two-sided test. Both
+    Each column shows the difference, its 95% confidence interval and the p-value of a two-sided test. Both
     resample whole days or recordings, because sequences of one recording resemble each other, and recordings
     of one day. Negative means that FIRST is better.
 
@@ -112,7 +112,7 @@ def _server_s_words(
     yield printable(f"{comparison.split}{edition}")
     yield units(scores[0])
     if any(gap.low is not None for gap in comparison.differences().values()):
-        yield f"95 % confidence intervals and p-values over {in_words(comparison.unit, comparison.n_units)}"
+        yield f"95% confidence intervals and p-values over {in_words(comparison.unit, comparison.n_units)}"
     yield ""
     yield from table(names, scores, comparison.differences(), decimals=comparison.decimals)
     pair_sentence = comparison.pairs[0].sentence if comparison.pairs else ""
@@ -161,7 +161,7 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, unit: str | N
     click.echo("")
     click.echo(units(reports[0].flat()))
     if any(gap.low is not None for gap in differences.values()):
-        click.echo(f"95 % confidence intervals and p-values over {taken}")
+        click.echo(f"95% confidence intervals and p-values over {taken}")
     primary = primary_of(reports[0].flat())
     if primary in differences:
         click.echo(printable(sentence(*names, name=primary, difference=differences[primary])))
@@ -196,8 +196,8 @@ def table(
 
     rows += [
         [Cell("difference", is_bold=True), *column("difference")],
-        [Cell("95 % from"), *column("low")],
-        [Cell("95 % to"), *column("high")],
+        [Cell("95% from"), *column("low")],
+        [Cell("95% to"), *column("high")],
         [Cell("p"), *map(Cell, chances)],
     ]
     return aligned(rows, align="<" + "." * len(columns))

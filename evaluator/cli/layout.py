@@ -133,7 +133,7 @@ def score_table(
                     for ends in map(intervals.get, scores)
                 ),
             ]
-            for end, words in ((0, "95 % from"), (1, "95 % to"))
+            for end, words in ((0, "95% from"), (1, "95% to"))
             if intervals
         ),
         [Cell("count"), *(Cell(NO_VALUE if n is None else f"{n:,}") for n in behind)],

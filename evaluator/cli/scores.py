@@ -81,7 +81,7 @@ class _Scored:
     "--intervals",
     "with_intervals",
     is_flag=True,
-    help="Also 95 % confidence intervals (bootstrap over days or recordings), as on the board.",
+    help="Also 95% confidence intervals (bootstrap over days or recordings), as on the board.",
 )
 @unit_option
 @click.option(
@@ -317,7 +317,7 @@ def _shown(scored_files: Sequence[_Scored], rows: Sequence[ResultRow], *, by: st
         lines = list(_in_words(scored_files[0].report, rows[0]))
     else:
         lines = [*_table(rows, by=by), "", units(rows[0].scores), _counts_in_words(scored_files[0].report)]
-        lines += [f"95 % confidence intervals; bootstrap over {rows[0].units}"] if rows[0].units else []
+        lines += [f"95% confidence intervals; bootstrap over {rows[0].units}"] if rows[0].units else []
     return "".join(f"{line}\n" for line in lines)
 
 
@@ -334,7 +334,7 @@ def _in_words(report: Report, row: ResultRow) -> Iterator[str]:
     yield f"truth        {report.truth_digest}"
     yield f"predictions  {report.predictions_digest}"
     if row.units:
-        yield f"intervals    95 %, bootstrap over {row.units}"
+        yield f"intervals    95%, bootstrap over {row.units}"
 
 
 def _table(rows: Sequence[ResultRow], *, by: str | None) -> list[str]:
@@ -350,7 +350,7 @@ def _table(rows: Sequence[ResultRow], *, by: str | None) -> list[str]:
     lines = [[Cell(head, is_bold=True) for head in heads]]
     for row in rows:
         lines.append(line([of(row) for _, of in names], list(row.scores.values()), f"{row.n_sequences:,}"))
-        for end, words in ((0, "  95 % from"), (1, "  95 % to")) if any(row.intervals.values()) else ():
+        for end, words in ((0, "  95% from"), (1, "  95% to")) if any(row.intervals.values()) else ():
             ends = [row.intervals[name] for name in scores]
             values = [None if pair is None else pair[end] for pair in ends]
             lines.append(line([words, *[""] * (len(names) - 1)], values, ""))

@@ -109,7 +109,7 @@ def _table(submission: Submission) -> Iterator[str]:
         ["", *map(short_name, scores)],
         ["---", *("---:" for _ in scores)],
         ["error", *map(text, scores.values())],
-        *([["95 %", *low_high]] if set(low_high) != {NO_VALUE} else []),
+        *([["95%", *low_high]] if set(low_high) != {NO_VALUE} else []),
         ["count", *(NO_VALUE if n is None else f"{n:,}" for n in n_behind)],
     ]
     for row in rows:

@@ -64,7 +64,7 @@ def in_short(submission: Submission) -> Iterator[str]:
         )
     ]
     if errors:
-        yield f"{', '.join(errors)}, in brackets the 95 % confidence intervals"
+        yield f"{', '.join(errors)}, in brackets the 95% confidence intervals"
     elif submission.awaits_intervals:
         yield "The confidence intervals are being computed."
 

@@ -85,7 +85,7 @@ class Account(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ConfidenceInterval(msgspec.Struct, frozen=True, kw_only=True):
-    """The 95 % interval of a value and of its rank; None if unknown."""
+    """The 95% interval of a value and of its rank; None if unknown."""
 
     low: float | None = None
     high: float | None = None

@@ -74,12 +74,12 @@ def rank_ranges(
     quoted: Quoted | None = None,
     between: Callable[[], None] = lambda: None,
 ) -> RankRanges:
-    """Compute 95 % rank ranges of N entries by `sums` (N, G, columns), in the `usable` columns.
+    """Compute 95% rank ranges of N entries by `sums` (N, G, columns), in the `usable` columns.
 
     `published` (N, columns) are the ranked values, NaN where absent; `between` is called every fraction of a
     second. In each column, step-down max-t over all paired differences (Mogstad, Romano, Shaikh and Wilhelm,
     Review of Economic Studies 91, 2024) gives the range from 1 + (rows significantly better) to rows − (rows
-    significantly worse); all ranges hold the true ranks with 95 % probability. t = ΣD_g / √ΣD_g², its null
+    significantly worse); all ranges hold the true ranks with 95% probability. t = ΣD_g / √ΣD_g², its null
     distribution comes from sign flips. Equal published values never differ significantly, so a range holds
     the published rank.
     """

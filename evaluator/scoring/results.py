@@ -60,7 +60,7 @@ class Details:
 
 @dataclass(frozen=True, slots=True)
 class GroupScores:
-    """The scores of one group by name, None where empty; `intervals` are at 95 %, None if absent."""
+    """The scores of one group by name, None where empty; `intervals` are at 95%, None if absent."""
 
     group: str
     n_sequences: int

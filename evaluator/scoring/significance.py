@@ -17,7 +17,7 @@ P_CLASSES: Final = (0.001, 0.01, SIGNIFICANT)
 MIN_DEGREES: Final = 8.0
 """With fewer degrees of freedom nothing is said of a mean: too few units to know how much they vary."""
 
-# Of the normal distribution's 97.5 % point: what a difference must be to be found with a power of 80 %.
+# Of the normal distribution's 97.5% point: what a difference must be to be found with a power of 80 %.
 _DETECTABLE: Final = (1.959964 + 0.841621) / 1.959964
 
 
@@ -46,7 +46,7 @@ class Influence:
 class Difference:
     """First minus second in one column: below 0 the first is better.
 
-    `low` and `high` are its 95 % interval, `p` that of the two-sided sign-flip test; None for too few units.
+    `low` and `high` are its 95% interval, `p` that of the two-sided sign-flip test; None for too few units.
     `p_below` is the smallest of `P_CLASSES` above p, else 1; hidden splits show it alone. `n_effective` is
     the effective number of units, `unit` their kind (recording, day or given), `influence` how few of them
     decide.
@@ -67,12 +67,12 @@ class Difference:
 
     @property
     def is_significant(self) -> bool:
-        """Whether p is below 5 %, uncorrected for other columns."""
+        """Whether p is below 5%, uncorrected for other columns."""
         return self.p_below is not None and self.p_below <= SIGNIFICANT
 
     @property
     def detectable_difference(self) -> float | None:
-        """The difference detected with about 80 % power, 1.43 half widths; None if significant."""
+        """The difference detected with about 80% power, 1.43 half widths; None if significant."""
         return None if self.is_significant else self.resolution
 
     @property
@@ -105,7 +105,7 @@ def best_of(n: int) -> float:
 
 
 def significant_together(differences: Sequence[Difference]) -> list[bool]:
-    """Test several differences together at 5 % (Holm 1979).
+    """Test several differences together at 5% (Holm 1979).
 
     The smallest p is compared with 0.05 / m, the next with 0.05 / (m − 1), until one is not below. `p_below`
     replaces an unknown p; without either, a difference is not tested.

@@ -78,7 +78,7 @@ class Bootstrap:
 
     @cached_property
     def _tails(self) -> Floats:
-        """Compute the share beyond either end of an interval, by column: below 2.5 % for few units."""
+        """Compute the share beyond either end of an interval, by column: below 2.5% for few units."""
         # (Σn)² / Σn² units of equal size for the mean, `degrees_of` for its error.
         squares = (self._counts**2).sum(axis=0)
         effective = np.divide(self._n**2, squares, out=np.ones_like(squares), where=squares > 0)
@@ -105,7 +105,7 @@ class Bootstrap:
         return np.asarray(np.multiply(shaped, self._inverse_counts, out=shaped))
 
     def intervals(self, sums: Floats) -> tuple[Floats, Floats]:
-        """Compute 95 % intervals of N entries by `sums` (N, G, columns): two (N, columns), NaN if absent."""
+        """Compute 95% intervals of N entries by `sums` (N, G, columns): two (N, columns), NaN if absent."""
         # The shape of the product is fixed, so that an interval never depends on other entries of the board.
         low = np.full((len(sums), sums.shape[2]), np.nan)
         high = low.copy()
@@ -125,21 +125,21 @@ class Bootstrap:
 
 
 def _tail(n_effective: float, *, degrees: float) -> float:
-    """Compute the share of resamples beyond either end of a 95 % interval of `n_effective` equal units.
+    """Compute the share of resamples beyond either end of a 95% interval of `n_effective` equal units.
 
     >>> round(_tail(1e9, degrees=1e9), 4), round(_tail(100.0, degrees=99.0), 4)
     (0.025, 0.0231)
     >>> round(_tail(20.0, degrees=10.0), 4)
     0.0111
     """
-    # Φ(−t(97.5 %) · √(n / (n − 1))), the expanded percentiles of Hesterberg (The American Statistician 69,
+    # Φ(−t(97.5%) · √(n / (n − 1))), the expanded percentiles of Hesterberg (The American Statistician 69,
     # 2015), with Student's t. Below 8 degrees there is no interval, so both numbers are at least 3 here.
     n = max(n_effective, 3.0)
     return NormalDist().cdf(-_student(max(degrees, 3.0)) * (n / (n - 1)) ** 0.5)
 
 
 def _student(degrees: float) -> float:
-    """Compute the 97.5 % point of Student's distribution, to 0.00003 for 8 degrees of freedom or more.
+    """Compute the 97.5% point of Student's distribution, to 0.00003 for 8 degrees of freedom or more.
 
     >>> round(_student(8.0), 4), round(_student(19.0), 4)
     (2.306, 2.093)

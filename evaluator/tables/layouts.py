@@ -161,8 +161,8 @@ def _caption(rows: Sequence[Row], origin: Origin) -> tuple[str, ...]:
 
 def brackets(unit: str, n_units: int | None) -> str:
     return (
-        f"In square brackets: 95 % confidence interval, bootstrap over {in_words(unit, n_units)}. In round "
-        "brackets behind a rank: rank range at 95 %."
+        f"In square brackets: 95% confidence interval, bootstrap over {in_words(unit, n_units)}. In round "
+        "brackets behind a rank: rank range at 95%."
     )
 
 

@@ -88,7 +88,7 @@ def _caption(rows: Sequence[ResultRow]) -> str:
     caption = f"{metrics}; lower is better."
     if not any(row.units and any(row.intervals.values()) for row in rows):
         return caption
-    return f"{caption} In square brackets: 95 % confidence interval, bootstrap over {rows[0].units}."
+    return f"{caption} In square brackets: 95% confidence interval, bootstrap over {rows[0].units}."
 
 
 def cells_of(row: ResultRow) -> Iterator[str]:

@@ -48,9 +48,9 @@ def sentence(
     `withheld` is the reason for a missing interval, by default too few units.
 
     >>> sentence("A", "B", name="mid_crucial", difference=Difference(-4.1, -5.3, -2.9, 0.0003))
-    "A's MiD on crucial is 4.1 lower than B's (95 % confidence interval: 2.9 to 5.3 lower; p = 0.0003)."
+    "A's MiD on crucial is 4.1 lower than B's (95% confidence interval: 2.9 to 5.3 lower; p = 0.0003)."
     >>> sentence("A", "B", name="rte", difference=Difference(0.7, 0.2, 1.2, 0.02))  # doctest: +ELLIPSIS
-    "A's RTE is 0.70 percentage points higher than B's (95 % confidence interval: 0.20 to 1.20 higher; ...
+    "A's RTE is 0.70 percentage points higher than B's (95% confidence interval: 0.20 to 1.20 higher; ...
     """
     column, unit = column_words(name), metric_of(name).unit_of_difference
     if round(difference.difference, decimals) == 0:
@@ -70,13 +70,13 @@ def sentence(
     if difference.is_significant and 0 in (difference.low, difference.high):
         # So it is on a hidden split alone, where p judges and the ends only say how large.
         ends += ", rounded outwards"
-    statement = f"{gap} (95 % confidence interval: {ends}; {p_text(difference.p, difference.p_below)})."
+    statement = f"{gap} (95% confidence interval: {ends}; {p_text(difference.p, difference.p_below)})."
     detectable = difference.detectable_difference
     if detectable is None:
         return statement
     return (
         f"{statement} The difference is not significant. The test detects a difference above "
-        f"{_amount(detectable, digits)}{unit} with about 80 % power."
+        f"{_amount(detectable, digits)}{unit} with about 80% power."
     )
 
 
@@ -167,7 +167,7 @@ def resolution(pairs: Sequence[Mapping[str, Difference]], *, decimals: int = 2) 
 
     >>> some = [{"mid": Difference(-1, -2, 0, 0.1), "rte": Difference(-1, -1.5, -0.5, 0.01)}]
     >>> print(resolution(some))
-    Resolution: neighbouring methods are told apart, with about 80 % power, if they differ by MiD 1.43, RTE \
+    Resolution: neighbouring methods are told apart, with about 80% power, if they differ by MiD 1.43, RTE \
 0.71 percentage points (medians of 1 pair).
     """
     names = dict.fromkeys(name for pair in pairs for name in pair)
@@ -181,7 +181,7 @@ def resolution(pairs: Sequence[Mapping[str, Difference]], *, decimals: int = 2) 
         return ""
     n = max(map(len, known.values()))
     return (
-        f"Resolution: neighbouring methods are told apart, with about 80 % power, if they differ by "
+        f"Resolution: neighbouring methods are told apart, with about 80% power, if they differ by "
         f"{', '.join(parts)} (medians of {counted(n, 'pair')})."
     )
 

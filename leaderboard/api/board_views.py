@@ -23,7 +23,7 @@ INTERVALS = OpenApiParameter(
     "intervals",
     str,
     enum=list(tables.WITH_INTERVALS),
-    description="Whether to include the 95 % confidence interval of each score.",
+    description="Whether to include the 95% confidence interval of each score.",
 )
 MINE = OpenApiParameter(
     "mine",

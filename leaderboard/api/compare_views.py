@@ -37,12 +37,12 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     difference = serializers.FloatField(help_text="Difference in the column's unit.")
     low = serializers.FloatField(
         allow_null=True,
-        help_text="Lower end of the 95 % confidence interval, rounded outwards where the ground truth is "
+        help_text="Lower end of the 95% confidence interval, rounded outwards where the ground truth is "
         "hidden; null: too few units, or withheld.",
     )
     high = serializers.FloatField(
         allow_null=True,
-        help_text="Upper end of the 95 % confidence interval, rounded outwards where the ground truth is "
+        help_text="Upper end of the 95% confidence interval, rounded outwards where the ground truth is "
         "hidden; null: too few units, or withheld.",
     )
     p = serializers.FloatField(
@@ -65,7 +65,7 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
         "positives. Where the ground truth is hidden, the interval does not say this: 0 may be an end."
     )
     detectable_difference = serializers.SerializerMethodField(
-        help_text="The smallest difference that the test detects with about 80 % power, an estimate; null: "
+        help_text="The smallest difference that the test detects with about 80% power, an estimate; null: "
         "this one is significant, or there are too few units."
     )
     sentence = serializers.SerializerMethodField(

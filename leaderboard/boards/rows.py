@@ -44,7 +44,7 @@ class Profile:
 
 @dataclass(frozen=True, slots=True)
 class ConfidenceInterval:
-    """The 95 % confidence interval of a value, and its rank range; None until a worker has computed it."""
+    """The 95% confidence interval of a value, and its rank range; None until a worker has computed it."""
 
     low: float | None = None
     high: float | None = None

@@ -63,9 +63,9 @@ def latest_change(split: Split) -> Publication | None:
     return latest if latest and latest.replaced_id else None
 
 
-def latest_changes(n: int) -> list[Publication]:
-    """Return the last changes of all boards that are not switched off, newest first."""
-    rows = Publication.objects.filter(split__in=Split.objects.shown())
+def latest_changes(splits: Iterable[Split], n: int) -> list[Publication]:
+    """Return the last changes of these splits' boards, newest first."""
+    rows = Publication.objects.filter(split__in=splits)
     rows = rows.select_related("split", "edition__ground_truth", "replaced__ground_truth")
     return list(rows.order_by("-at", "-pk")[:n])
 

@@ -32,7 +32,7 @@ _NEWS: Final = timedelta(days=1)
 _OUTCOMES: Final = {
     Status.SCORED: "is scored",
     Status.REJECTED: "is rejected: the file has problems, which the page lists",
-    Status.SYSTEM_ERROR: "could not be scored: the fault is ours, and the maintainers see it",
+    Status.SYSTEM_ERROR: "could not be scored: this was our fault, and the maintainers have been told",
 }
 
 
@@ -150,7 +150,7 @@ def _tokens(now: datetime) -> Iterator[Mail]:
 def _deadlines(now: datetime) -> Iterator[Mail]:
     for split in Split.objects.filter(closes_at__gt=now, closes_at__lte=now + CLOSES_WITHIN):
         at = f"{split.closes_at:%Y-%m-%d at %H:%M} UTC"
-        text = f"{split.pk} closes on {at}. After that no file is taken.\n\n{_link('board', split.pk)}"
+        text = f"{split.pk} closes on {at}. After that it takes no more files.\n\n{_link('board', split.pk)}"
         for user in readers(MailKind.DEADLINE).filter(has_sent_to(split)):
             key = f"deadline:{split.pk}:{split.closes_at:%Y%m%d%H%M}"
             subject = f"{split.pk} closes on {at}"
@@ -166,7 +166,7 @@ def has_sent_to(split: Split) -> Exists:
 def framed(*, subject: str, text: str) -> tuple[str, str]:
     """Frame subject and text with the site's name and the link to switch notices off."""
     name = settings.BENCHMARK.site_name
-    footer = f"--\n{name}\n{settings.SITE_URL}\nChoose which mails you get: {_link('mails')}"
+    footer = f"--\n{name}\n{settings.SITE_URL}\nChoose which emails you get: {_link('mails')}"
     return f"[{name}] {subject}", f"{text}\n\n{footer}\n"
 
 

@@ -100,10 +100,10 @@ def content_of(
     """Analyse the errors of one submission; the points drawn are the same for all submissions.
 
     - `curve`: mean errors by true TTC, `{"low_s", "high_s", "n", "mid", …, "intervals"}` for each bin
-      [low_s, high_s) with sequences; `intervals` are the 95 % intervals `{"mid": [low, high], …}` of means
+      [low_s, high_s) with sequences; `intervals` are the 95% intervals `{"mid": [low, high], …}` of means
       with enough units;
     - `distribution`: `{"mid": […], …}`, each a list of `{"quantile", "value"}` from 0.05 to 0.99;
-    - `histogram`: `{"low", "high", "n"}` of the ranking metric over 24 equal bins up to its 95 % quantile;
+    - `histogram`: `{"low", "high", "n"}` of the ranking metric over 24 equal bins up to its 95% quantile;
       the last has `"high": None`;
     - `scatter`: `{"true_s": […], "predicted_s": […]}` of at most 500 random sequences, predictions truncated;
     - `worst`: at most 20 recordings by mean error in it, worst first: `{"recording", "n", "mid", …}`;

@@ -11,6 +11,8 @@ from django.utils.text import slugify
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
+from leaderboard.web import equations
+
 Target = Callable[[str], str]
 # Where links may lead: pages of any host, mail, and places on this site.
 _TARGET: Final = re.compile(r"(?:https?:|mailto:|/|#|\?)", re.IGNORECASE)
@@ -51,7 +53,7 @@ class Document:
 
 
 def guide(text: str, *, link: Target, image: Callable[[str], Mapping[str, str]]) -> Document:
-    """Render a guide of the project.
+    """Render a guide of the project; a block of code in the language `math` is an equation.
 
     `link` returns the target of an address, `image` the attributes of a picture.
     """
@@ -62,6 +64,8 @@ def guide(text: str, *, link: Target, image: Callable[[str], Mapping[str, str]])
         if "src" in token.attrs:
             token.attrs.update(image(str(token.attrs["src"])))
     for token in tokens:
+        if token.type == "fence" and token.info == "math":
+            token.type, token.content = "html_block", equations.mathml(token.content)
         if token.children and [child.type for child in token.children] == ["image"]:
             token.children = _linked(token.children[0])
     return _document(tokens, _parser(images=True))

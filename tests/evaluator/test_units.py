@@ -185,7 +185,7 @@ def folder(tmp_path: Path) -> Path:
 
 def test_score_says_over_which_units_its_intervals_are(tsttc: Tsttc, folder: Path) -> None:
     score = ["score", folder / "mine.json", "--truth", folder / "truth.csv"]
-    assert "intervals    95 %, bootstrap over 32 days\n" in tsttc(*score, "--intervals").stdout
+    assert "intervals    95%, bootstrap over 32 days\n" in tsttc(*score, "--intervals").stdout
     document = json.loads(tsttc(*score, "--intervals", "--json").stdout)
     assert (document["unit"], document["n_units"]) == ("day", 32)
     own = json.loads(tsttc(*score, "--intervals", "--unit", "recording", "--json").stdout)
@@ -200,11 +200,11 @@ def test_score_says_over_which_units_its_intervals_are(tsttc: Tsttc, folder: Pat
 def test_compare_says_over_which_units_it_tests(tsttc: Tsttc, folder: Path) -> None:
     files = folder / "mine.json", folder / "theirs.json"
     compare = ["compare", *files, "--truth", folder / "truth.csv"]
-    assert "95 % confidence intervals and p-values over 32 days\n" in tsttc(*compare).stdout
+    assert "95% confidence intervals and p-values over 32 days\n" in tsttc(*compare).stdout
     document = json.loads(tsttc(*compare, "--json").stdout)
     assert (document["unit"], document["n_units"]) == ("day", 32)
     assert document["differences"]["mid"]["n_effective"] == 32
     text = tsttc(*compare, "--unit", "recording").stdout
-    assert "95 % confidence intervals and p-values over 96 recordings\n" in text
+    assert "95% confidence intervals and p-values over 96 recordings\n" in text
     board = tsttc("compare", "A", "B", "--unit", "day")
     assert (board.exit_code, "--unit needs --truth" in board.stderr) == (2, True)

@@ -18,7 +18,7 @@ def chunks(n: int) -> Iterator[int]:
 
 
 def margin(share: float, n: int) -> float:
-    """The half width of a 95 % confidence interval of a simulated share."""
+    """The half width of a 95% confidence interval of a simulated share."""
     return 1.96 * float(max(share * (1 - share), 1e-9) / n) ** 0.5
 
 

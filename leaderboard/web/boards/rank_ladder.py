@@ -26,7 +26,7 @@ class Ladder(NamedTuple):
 
     steps: tuple[Step, ...]
     n_ranks: int  # of the scale
-    n_certain: int  # methods whose rank is the only one at 95 %
+    n_certain: int  # methods whose rank is the only one at 95%
     n_ranked: int
 
     @property

@@ -218,7 +218,7 @@ def counted_ranges(rules: Protocol, counts: Mapping[str, int]) -> list[tuple[TTC
 
 
 def rank_range(entry: Entry) -> str:
-    """Word the 95 % rank range; empty where its rank is the only one."""
+    """Word the 95% rank range; empty where its rank is the only one."""
     interval = entry.interval
     if interval.rank_low is None or interval.rank_high is None:
         return ""

@@ -32,7 +32,7 @@ _TTC_AXIS: Final = {
     "interval": 10,
     "axisLabel": {"formatter": call("number")},
 }
-MEAN, SPAN = "Mean error", "95 % confidence interval"
+MEAN, SPAN = "Mean error", "95% confidence interval"
 Row = Mapping[str, Any]
 
 

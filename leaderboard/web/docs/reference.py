@@ -53,6 +53,7 @@ def docs(splits: Sequence[Split], *, now: datetime) -> dict[str, Any]:
     )
     protocol = listing.rules_of(main.current_edition if main else None)
     ends = [end for each in protocol.ranges for end in each.closed_ends]
+    shared = sorted({end for end in ends if end and ends.count(end) > 1})  # no truth is 0
     return {
         "example": example.pk if example else "SPLIT",
         "has_manifest": example is not None,
@@ -61,7 +62,7 @@ def docs(splits: Sequence[Split], *, now: datetime) -> dict[str, Any]:
         "default_protocol": DEFAULT_PROTOCOL,
         "limit": f"{protocol.limit_s:g}",
         "has_open_ends": len(ends) < 2 * len(protocol.ranges),
-        "shared_end": next((f"{end:g}" for end in ends if ends.count(end) > 1), ""),
+        "shared_ends": [f"{end:g} s" for end in shared],
         "follows_toolkit": _follows_toolkit(protocol),
         "boundaries": [boundary.replace("-", "−") for boundary in protocol.boundaries],
         "max_size": file_size(settings.MAX_PREDICTIONS_BYTES),

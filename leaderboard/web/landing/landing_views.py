@@ -14,12 +14,13 @@ from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from leaderboard.boards import snapshots
+from leaderboard.boards.listing import rules_of
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.models import Split, User
 from leaderboard.quotas import admissions
 from leaderboard.web.boards import board_query
-from leaderboard.web.charts import chart_views
-from leaderboard.web.landing.leaders import lead_words, leaders
+from leaderboard.web.charts import chart_views, profile_chart
+from leaderboard.web.landing.leaders import N_LEADERS, lead_words, leaders, range_leaders
 from leaderboard.web.landing.news import latest
 from leaderboard.web.submissions.forms import offers_for
 
@@ -27,9 +28,12 @@ from leaderboard.web.submissions.forms import offers_for
 @require_safe
 def home(request: HttpRequest) -> HttpResponse:
     splits = splits_of(request)
-    main = main_split(splits)
+    main, now = main_split(splits), timezone.now()
+    in_order = [main, *splits] if main else []
     context = {
-        "dates": _dates(splits, reader=request.user, now=timezone.now()),
+        "open_split": next((split for split in in_order if admissions.is_open(split, now=now)), None),
+        "facts": [*_counts(in_order), *settings.BENCHMARK.landing.facts, *_ranges(main)],
+        "dates": _dates(splits, reader=request.user, now=now),
         "news": latest(splits),
         "board_split": main.pk if main else "",
     }
@@ -53,6 +57,21 @@ def main_split(splits: Sequence[Split]) -> Split | None:
     return next((split for split in splits if split.pk == name), next(iter(splits), None))
 
 
+def _counts(splits: Sequence[Split]) -> list[tuple[str, str]]:
+    """Count the sequences and recordings of the first real ground truth."""
+    for split in splits:
+        if split.current_edition is not None and not split.is_simulated:
+            truth = split.current_edition.ground_truth
+            sequences = (f"{truth.n_sequences:,}", f"sequences in {split.title}")
+            return [sequences, (f"{truth.n_recordings:,}", "recordings")]
+    return []
+
+
+def _ranges(main: Split | None) -> list[tuple[str, str]]:
+    ranges = rules_of(main.current_edition if main else None).ranges
+    return [(f"{len(ranges)} TTC ranges", ", ".join(each.ends for each in ranges) + " s")]
+
+
 def _dates(
     splits: Sequence[Split], *, reader: User | AnonymousUser, now: datetime
 ) -> list[tuple[Split, str]]:
@@ -68,12 +87,11 @@ def _dates(
 def _leading(main: Split) -> dict[str, Any]:
     # Only what everybody sees, for every reader.
     board = snapshots.board(split=main, viewer=AnonymousUser())
-    progress = chart_views.progress(board)
     return {
         "board": board,
         "leaders": leaders(board),
         "lead": lead_words(board),
-        "fronts": [row for row in progress.rows if row[-1]],
-        "note": progress.note,
-        "progress_label": progress.label,
+        "range_leaders": range_leaders(board),
+        "profile": profile_chart.profile(board.entries[:N_LEADERS]),
+        "progress": chart_views.progress(board),
     }

@@ -1,4 +1,4 @@
-"""The first rows of a board, and whether the lead is certain."""
+"""The first rows of a board, whether the lead is significant, and who leads in each TTC range."""
 
 from collections.abc import Sequence
 from typing import Any, Final
@@ -6,6 +6,7 @@ from typing import Any, Final
 from django.utils.text import get_text_list
 
 from evaluator.counting import counted
+from evaluator.metrics.protocol import range_of
 from evaluator.scoring.results import format_rounded
 from leaderboard.boards.listing import Board
 from leaderboard.boards.rows import Entry
@@ -32,12 +33,24 @@ def leaders(board: Board) -> list[dict[str, Any]]:
     ]
 
 
+def range_leaders(board: Board) -> list[tuple[str, str, str]]:
+    """Return ends, leading methods and lowest value of each TTC range that has a value."""
+    rules, rows = board.rules, []
+    for name in rules.names_of(rules.primary.name):
+        first = [entry for entry in _ranked(board) if name in entry.best]
+        ttc_range = range_of(name)
+        if ttc_range is not None and first:
+            value = format_rounded(first[0].scores[name], decimals=first[0].decimals)
+            rows.append((ttc_range.seconds, _listed([entry.method for entry in first]), value))
+    return rows
+
+
 def _ranked(board: Board) -> list[Entry]:
     return [entry for entry in board.entries if entry.rank is not None]
 
 
 def lead_words(board: Board) -> str:
-    """Say how certain the lead is, by 95 % rank ranges; empty for fewer than two rows."""
+    """Say whether the lead is significant, by 95% rank ranges; empty for fewer than two rows."""
     ranked = _ranked(board)
     first = [entry for entry in ranked if entry.rank == 1]
     if len(ranked) < 2:
@@ -47,15 +60,13 @@ def lead_words(board: Board) -> str:
     (leader,) = first
     interval = leader.interval
     if interval.rank_low is None or interval.rank_high is None:
-        return (
-            f"It is not known whether the lead of {leader.method} is certain: {_why_unknown(board, leader)}"
-        )
+        return f"Whether the lead is significant is not known: {_why_unknown(board, leader)}"
     if interval.rank_high == 1:
-        return f"The lead of {leader.method} is certain: at 95 % confidence its rank is 1."
+        return f"The lead of {leader.method} is significant (95% confidence)."
     also = [e.method for e in ranked[1:] if e.interval.rank_low == 1]
     others = f" {_listed(also)} may also be first." if also else ""
     return (
-        f"The lead of {leader.method} is not certain: at 95 % confidence its rank is "
+        f"The lead of {leader.method} is not significant: with 95% confidence its rank is "
         f"{interval.rank_low} to {interval.rank_high}.{others}"
     )
 

@@ -1,4 +1,4 @@
-"""The latest news of all boards: published editions, rollbacks and new entries."""
+"""The latest news of boards without simulated data: published editions, rollbacks and new entries."""
 
 from collections.abc import Iterator, Sequence
 from datetime import datetime
@@ -19,12 +19,13 @@ News = tuple[datetime, str, str, str]
 
 
 def latest(splits: Sequence[Split]) -> list[News]:
-    """Return public news of these splits, newest first."""
-    return sorted([*_entries(splits), *_editions()], key=itemgetter(0), reverse=True)[:N_NEWS]
+    """Return public news of those splits that are not simulated, newest first."""
+    real = [split for split in splits if not split.is_simulated]
+    return sorted([*_entries(real), *_editions(real)], key=itemgetter(0), reverse=True)[:N_NEWS]
 
 
-def _editions() -> Iterator[News]:
-    for publication in history.latest_changes(N_NEWS):
+def _editions(splits: Sequence[Split]) -> Iterator[News]:
+    for publication in history.latest_changes(splits, N_NEWS):
         split, edition = publication.split, publication.edition
         href = reverse("edition", args=[split.pk, edition.number])
         yield publication.at, href, f"{split.title}, edition {edition.number}", _change(publication)

@@ -184,9 +184,7 @@ def test_board_is_shown_in_an_edition_as_of_a_time_and_with_intervals(
     lines = tsttc("board", "--at", "2026-11-20", "--intervals").stdout.splitlines()
     assert "20.00 [19.50, 20.75]  21.00  " in lines[5]
     assert lines[5].split()[:2] == ["2", "(1–2)"]
-    assert lines[-1].startswith(
-        "In square brackets: 95 % confidence interval, bootstrap over recordings. In "
-    )
+    assert lines[-1].startswith("In square brackets: 95% confidence interval, bootstrap over recordings. In ")
     assert lines[4].index(".8") == lines[5].index(".00"), "decimal points stand below each other"
     assert tsttc("board", "--edition", "1").exit_code == 0
     assert [request.path for request in site.requests] == [

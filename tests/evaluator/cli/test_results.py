@@ -33,7 +33,7 @@ def lines_above(tsttc: Tsttc, site: RecordedSite, document: dict[str, Any]) -> l
 def test_rank_and_errors_come_with_where_they_may_lie(tsttc: Tsttc, site: RecordedSite) -> None:
     assert lines_above(tsttc, site, SURE) == [
         "rank 2 (1–3)",
-        "MiD 10.25 (9.60–10.90), RTE 15.25 (9.60–10.90), in brackets the 95 % confidence intervals",
+        "MiD 10.25 (9.60–10.90), RTE 15.25 (9.60–10.90), in brackets the 95% confidence intervals",
     ]
 
 

@@ -43,7 +43,7 @@ def test_result_and_gates_are_appended(tsttc: Tsttc, site: RecordedSite, tmp_pat
         "**The gate fails: MiD is 13.92, and Old has 13.00.**",
     ]
     assert "If published: rank 2 (1–3)" in lines
-    assert [line for line in lines if line.startswith("| 95 % | 13.21–14.60 | – |")]
+    assert [line for line in lines if line.startswith("| 95% | 13.21–14.60 | – |")]
     assert "- `--fail-if rte > 99` passes: rte is 14.00" in lines
     assert "- `--fail-if-worse-than Old` **fails**: MiD is 13.92, and Old has 13.00" in lines
     assert "Warning: The values look shuffled." in lines

@@ -174,7 +174,7 @@ def test_pages_answers_and_exports_say_which_unit_it_is(client: Client, tmp_path
         assert (document["unit"], document["n_units"]) == ("day", 32), address
     (listed,) = client.get("/api/v1/splits/test/editions").json()
     assert (listed["unit"], listed["n_units"]) == ("day", 32)
-    caption = "95 % confidence interval, bootstrap over 32 days"
+    caption = "95% confidence interval, bootstrap over 32 days"
     for form in ("tex", "md"):
         text = client.get(f"/board/test.{form}", {"intervals": "1"}, follow=True).text
         assert caption in text.replace("\\%", "%"), form

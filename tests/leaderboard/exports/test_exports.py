@@ -120,7 +120,7 @@ def test_intervals_come_for_who_asks(edition: Edition, owner: User, client: Clie
     assert text_of(client, "tex", "?intervals=1").count(r"\scriptsize") == 30
     assert re.search(r"\*?[0-9.]+\*? \[[0-9.]+, [0-9.]+\]", text_of(client, "md", "?intervals=1"))
     for form in ("tex", "md"):
-        words = r"95 \\?% confidence interval, bootstrap over 24 recordings.*rank range at 95"
+        words = r"95\\?% confidence interval, bootstrap over 24 recordings.*rank range at 95"
         assert re.search(words, text_of(client, form, "?intervals=1"))
         assert not re.search(words, text_of(client, form)), "there are no brackets to be explained"
     rows = csv_rows(client, "?intervals=1")

@@ -130,7 +130,7 @@ def test_a_file_sent_on_the_site_brings_one_mail_with_its_outcome(edition: Editi
     [sent] = mail.outbox
     assert sent.subject == "[TSTTC leaderboard] Foo on test is scored"
     assert f"/submissions/{submission.pk}/" in sent.body
-    assert "Choose which mails you get: http://127.0.0.1:8000/mails/" in sent.body
+    assert "Choose which emails you get: http://127.0.0.1:8000/mails/" in sent.body
     assert queue_due_mails() == []
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from leaderboard.web import markdown
+from leaderboard.web import equations, markdown
 from tests import pages
 
 
@@ -73,3 +73,12 @@ def test_code_in_columns_is_a_box_that_scrolls_and_other_code_wraps() -> None:
     for text in ("```\na    1\nbb   2\n```\n", "    a    1\n    bb   2\n"):
         assert boxed in markdown.page(text).html
     assert "aligned" not in markdown.page("```sh\ntsttc check a.json --manifest b.csv\n```\n").html
+
+
+def test_an_equation_of_a_guide_is_mathml_and_one_of_a_maintainer_is_text() -> None:
+    text = "```math\n\\frac{1}{\\hat{\\tau}}\n```"
+    drawn = markdown.guide(text, link=str, image=lambda _: {}).html
+    assert drawn.startswith('<math display="block"><mfrac><mn>1</mn><mover accent="true"><mi>τ</mi>')
+    assert "<math" not in markdown.page(text).html
+    with pytest.raises(ValueError, match=r"sin' is not known in an equation"):
+        equations.mathml(r"\sin")

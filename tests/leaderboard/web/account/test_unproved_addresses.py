@@ -68,7 +68,7 @@ def test_an_address_that_another_account_added_is_free_for_its_owner(attacker: C
     assert not EmailAddress.objects.filter(email=VICTIM).exists(), "nothing is kept before it is proved"
     [code_mail] = mail.outbox
     assert code_mail.to == [VICTIM]
-    assert "The account attacker@example.org of" in code_mail.body
+    assert "account attacker@example.org wants" in code_mail.body
     page = assert_sound(attacker.get(CONFIRM)).one("main").text
     assert "belongs to the account attacker@example.org" in page
 
@@ -76,7 +76,7 @@ def test_an_address_that_another_account_added_is_free_for_its_owner(attacker: C
     assert sign_up(victim, VICTIM).headers["Location"] == CONFIRM
     assert subjects() == ["Confirm your email address"] * 2
     # The mails tell the two apart, and the attacker's code is worth nothing on the owner's page.
-    assert "Somebody signed up at" in mail.outbox[1].body
+    assert "Someone signed up for" in mail.outbox[1].body
     assert "The code is wrong" in victim.post(CONFIRM, {"code": code_in(code_mail)}).text
     assert prove(victim).headers["Location"] == "/submit/"
     assert victim.get("/submissions/").status_code == 200

@@ -46,7 +46,7 @@ def test_verdict_comes_first_then_every_difference_with_interval_and_p(
     root = get(client, near.method_id, far.method_id)
     verdict = root.one("p", class_="verdict").text
     assert verdict.startswith(f"{near.method.name}'s MiD is ")
-    assert f"lower than {far.method.name}'s (95 % confidence interval: " in verdict
+    assert f"lower than {far.method.name}'s (95% confidence interval: " in verdict
     lead = root.one("p", class_="others").text
     assert lead.startswith("5 of the 5 other metrics differ"), "the others have too few recordings"
     assert len(root.one("table", class_="differences").all("tr", class_="significant")) == 6
@@ -119,7 +119,7 @@ def test_too_few_recordings_are_named_and_no_p_is_shown(
     builders.infer_all()
     root = get(client, *ids)
     assert "too few recordings (effective number 6.9; at least 8 needed)" in words(root)
-    assert "95 % CI" not in [head.text for head in root.one("table", class_="differences").all("th")]
+    assert "95% CI" not in [head.text for head in root.one("table", class_="differences").all("th")]
     assert root.all("p", class_="others") == []
     board = pages.page(client.get("/board/test/"))
     assert "too few recordings (effective number 6.9; at least 8 needed)" in board.one("main").text
@@ -150,7 +150,7 @@ def test_of_a_hidden_split_nobody_learns_on_how_few_recordings_a_difference_rest
     get(client, *ids)
     builders.infer_all()
     root = get(client, *ids)
-    assert "(95 % confidence interval: " in root.one("p", class_="verdict").text
+    assert "(95% confidence interval: " in root.one("p", class_="verdict").text
     assert root.all("p", class_="influence") == []
     (kept,) = Comparison.objects.values_list("differences", flat=True)
     assert {difference["influence"] for difference in kept.values()} == {None}

@@ -54,6 +54,17 @@ def test_a_guide_asks_the_database_for_nothing_and_is_compressed(
         assert len(answer.content) < 30_000
 
 
+def test_a_visitor_finds_the_empty_template_in_the_docs_and_a_way_on_from_a_missing_page(
+    client: Client, edition: Edition
+) -> None:
+    docs = pages.get(client, "/docs/")
+    assert docs.all("a", href="/submit/template/test.json") != []
+    assert "A sequence at exactly 3 s or 6 s counts in two TTC ranges" in docs.text
+    missing = pages.read(client.get("/nowhere/").text).one("main")
+    assert missing.one("form").attributes["action"] == "/docs/search/"
+    assert {"/board/test/", "/board/val/"} <= {a.attributes["href"] for a in missing.all("a")}
+
+
 # --- search ----------------------------------------------------------------------------------------------
 
 
@@ -106,9 +117,9 @@ def test_the_first_page_names_a_split_that_is_open_or_says_that_none_is(
 
     assert "--split test --method" in commands()
     Split.objects.filter(pk="test").update(closes_at=timezone.now())
-    assert "No split takes submissions now. The dates say" in commands()
+    assert "No split is open for submissions now. Dates" in commands()
     Split.objects.update(current_edition=None)
-    assert "Put the name of a split in place of SPLIT" in commands()
+    assert "Replace SPLIT with the name of an open one" in commands()
     assert "--split SPLIT --method" in commands()
 
 

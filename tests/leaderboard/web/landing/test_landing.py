@@ -1,4 +1,4 @@
-"""The landing page: what time to contact is, who leads and how certainly, and where to go from there."""
+"""The landing page: what time to contact is, who leads and how surely, and where to go from there."""
 
 import json
 from datetime import timedelta
@@ -22,7 +22,7 @@ def panel(client: Client, name: str) -> pages.Element:
 
 def alone(client: Client) -> str:
     """The sentence on the lead, without the link behind it."""
-    return landing(client).one("p", class_="lead-words").text.removesuffix(" Uncertainty")
+    return landing(client).one("span", class_="lead-words").text.removesuffix(" Uncertainty")
 
 
 # --- what it shows ---------------------------------------------------------------------------------------
@@ -34,6 +34,55 @@ def test_the_leaders_are_the_first_rows_of_the_main_board(client: Client, benchm
     assert [row.one("span", class_="number").text for row in rows] == [row[2] for row in board]
     names = [row.one("p", class_="name").text for row in rows]
     assert all(row[1].startswith(name) for row, name in zip(board, names, strict=True))
+
+
+def test_each_ttc_range_names_its_leaders_and_their_value(client: Client, benchmark: None) -> None:
+    rows = [[cell.text for cell in row.all("th") + row.all("td")] for row in _range_rows(client)]
+    assert rows == [
+        ["0–3 s", "Deep Scale", "27.6"],
+        ["3–6 s", "Deep Scale and Deep Scale (NeRF)", "15.6"],
+        ["6–20 s", "Deep Scale and Deep Scale (NeRF)", "11.5"],
+        ["−20–0 s", "Deep Scale", "13.7"],
+    ]
+
+
+def _range_rows(client: Client) -> list[pages.Element]:
+    return panel(client, "leaders").one("table").one("tbody").all("tr")
+
+
+def test_its_facts_are_those_of_the_file_and_counts_of_real_ground_truth(
+    client: Client, edition: Edition
+) -> None:
+    truth = edition.ground_truth
+    facts = landing(client).one("dl", class_="figures")
+    assert [each.text for each in facts.all("dd")] == [
+        f"{truth.n_sequences:,}",
+        f"{truth.n_recordings:,}",
+        "206,000",
+        "6 frames",
+        "4 TTC ranges",
+    ]
+    Split.objects.filter(pk="test").update(is_simulated=True)
+    builders.board_changed("test")
+    facts = landing(client).one("dl", class_="figures")
+    assert facts.all("dd")[0].text == "206,000"
+
+
+def filled_buttons(client: Client) -> list[pages.Element]:
+    return [each for each in landing(client).all("a", class_="button") if "plain" not in each.classes]
+
+
+def test_its_one_filled_button_leads_to_a_split_that_is_open(client: Client, edition: Edition) -> None:
+    (button,) = filled_buttons(client)
+    assert (button.text, button.attributes["href"]) == ("Submit", "/submit/?split=test")
+    Split.objects.filter(pk="demo").update(current_edition=edition)
+    Split.objects.filter(pk="test").update(closes_at=timezone.now())
+    builders.board_changed("test")
+    (button,) = filled_buttons(client)
+    assert (button.text, button.attributes["href"]) == ("Try a submission (demo)", "/submit/?split=demo")
+    Split.objects.filter(pk="demo").update(current_edition=None)
+    builders.board_changed("demo")
+    assert filled_buttons(client) == []
 
 
 def test_a_private_method_leads_nowhere_on_it_not_even_for_its_own_team(
@@ -56,7 +105,7 @@ def test_without_a_split_an_entry_or_with_one_entry_it_says_so(
     builders.score_all()
     (row,) = panel(client, "leaders").all("li")
     assert row.one("p", class_="name").text == "Alone"
-    assert landing(client).all("p", class_="lead-words") == []
+    assert landing(client).all("span", class_="lead-words") == []
     assert main_split([]) is None
 
 
@@ -67,16 +116,16 @@ def test_a_site_without_any_split_has_a_landing_page_and_no_main_board(client: C
     assert client.get("/board/").status_code == 404
 
 
-# --- whether the lead is certain -------------------------------------------------------------------------
+# --- whether the lead is significant ---------------------------------------------------------------------
 
 
-def test_a_lead_of_rows_from_papers_is_not_known_to_be_certain(client: Client, benchmark: None) -> None:
+def test_a_lead_of_rows_from_papers_is_not_known_to_be_significant(client: Client, benchmark: None) -> None:
     assert alone(client) == (
-        "It is not known whether the lead of Deep Scale is certain: papers report no values per recording."
+        "Whether the lead is significant is not known: papers report no values per recording."
     )
 
 
-def test_the_lead_is_as_certain_as_the_rank_range_of_the_first_row_says(
+def test_the_lead_is_as_significant_as_the_rank_range_of_the_first_row_says(
     client: Client, edition: Edition, owner: User, open_values: None
 ) -> None:
     PublishedResult.objects.all().delete()
@@ -85,7 +134,7 @@ def test_the_lead_is_as_certain_as_the_rank_range_of_the_first_row_says(
     builders.score_all()
     assert alone(client).endswith("the confidence intervals are being computed.")
     builders.infer_all()
-    assert alone(client) == "The lead of First is certain: at 95 % confidence its rank is 1."
+    assert alone(client) == "The lead of First is significant (95% confidence)."
     builders.submit(owner, builders.predictions(edition, factor=1.01), method="Twin")
     builders.score_all()
     builders.infer_all()
@@ -121,6 +170,15 @@ def test_news_are_editions_and_entries_the_newest_first(
     assert "current again: edition 2 was rolled back" in text
     assert "replaced edition 1: " in text
     assert "by Owls, rank " in text
+
+
+def test_there_are_no_news_of_simulated_data(
+    client: Client, rescored: Edition, entries: list[Submission]
+) -> None:
+    publish(rescored)
+    Split.objects.filter(pk="test").update(is_simulated=True)
+    builders.board_changed("test")
+    assert landing(client).all("h2", id="news") == []
 
 
 def test_news_name_an_anonymous_method_by_its_pseudonym(

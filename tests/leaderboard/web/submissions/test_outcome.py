@@ -87,7 +87,7 @@ def test_what_may_be_the_best_is_marked_as_on_the_board(
         root = pages.page(signed_in.get(address))
         cell = root.one("div", class_="result").all("tr")[1].all("td")[0]
         assert "with-best" in cell.classes
-        assert cell.text.endswith(", statistically tied for best in its column (95 % confidence)")
+        assert cell.text.endswith(", statistically tied for best in its column (95% confidence)")
         assert "Grey: statistically tied" in root.one("main").text
 
 
