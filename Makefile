@@ -44,7 +44,7 @@ test-fast: $(DEV_STAMP) ## what takes about a minute: no services, no browser, n
 
 test-torch: $(DEV_STAMP) $(TORCH_STAMP) ## the tests that need torch, in an environment of their own (.venv-torch)
 	@$(TORCH_VENV)/bin/python -c 'import lightning, torch, torchmetrics; print("torch", torch.__version__)'
-	$(TORCH_VENV)/bin/python -m pytest -q $(SPREAD) -m torch tests/evaluator tests/tsttc_baselines
+	OMP_NUM_THREADS=1 $(TORCH_VENV)/bin/python -m pytest -q $(SPREAD) -m torch tests/evaluator tests/tsttc_baselines
 
 chaos: $(DEV_STAMP) ## 200 uploads while everything that can fail does; says what was lost, doubled or stuck
 	@$(PY) -m tests.chaos

@@ -61,6 +61,7 @@ def test_a_training_tells_its_plan_its_rate_and_where_it_continues_and_keeps_a_l
         assert line.endswith(f" %, learning rate {rate:.3g}")
 
 
+@pytest.mark.torch
 def test_a_folder_without_ground_truth_says_so(tsttc: Tsttc, tmp_path: Path) -> None:
     folder = shutil.copytree(EXAMPLES / "baseline", tmp_path / "frames")
     (folder / "truth.csv").unlink()
