@@ -14,6 +14,7 @@ from leaderboard.boards import movement
 from leaderboard.boards.listing import Board
 from leaderboard.boards.rows import Entry
 from leaderboard.exports.tables import team_of
+from leaderboard.methods import details
 from leaderboard.models import Edition, Visibility
 from leaderboard.statistics import confidence
 from leaderboard.web.boards import whiskers
@@ -50,6 +51,7 @@ class BoardRow:
     source_number: int | None
     note: str  # why it stays in a former edition
     attempts: str
+    chips: tuple[tuple[str, str], ...]
     is_new: bool
     moved: int  # ranks risen in a month; fallen: below 0
 
@@ -138,6 +140,7 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
             source_number=numbers.get(entry.source),
             note=_note(entry, board.split.current_edition),
             attempts=_attempts(entry),
+            chips=details.chips(entry.details, of_row=True),
             is_new=entry.method_id in new,
             moved=moved.get(entry.method_id, 0) if entry.method_id else 0,
         )

@@ -66,7 +66,7 @@ def test_heads_are_plain_links_that_turn_round(client: Client, benchmark: None) 
 
 def test_open_split_without_submissions_says_how_to_be_the_first(client: Client, edition: Edition) -> None:
     notice = get(client).one("p", class_="notice")
-    assert "test has no submissions yet" in notice.text
+    assert "no submissions to Test yet" in notice.text
     assert notice.one("a").attributes["href"] == "/submit/?split=test"
 
 
@@ -74,7 +74,7 @@ def test_board_without_any_row_has_no_empty_table(client: Client, benchmark: Non
     PublishedResult.objects.filter(split="test").delete()
     root = get(client)
     assert root.all("table") == []
-    assert "not open yet" in root.one("main").text
+    assert "Not open for submissions yet" in root.one("main").text
 
 
 def test_demo_says_that_its_truth_is_simulated(client: Client, tmp_path: Path, benchmark: None) -> None:

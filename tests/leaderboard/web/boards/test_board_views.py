@@ -45,7 +45,7 @@ def test_values_have_intervals_ranks_have_ranges_and_what_is_with_the_best_is_ma
     assert cell.attributes["title"] == f"95% confidence interval: {low:.1f} to {high:.1f}"
     assert all("title" in each.attributes for each in row.all("td", class_="wide"))
     for cell in root.one("table", class_="board").all("td", class_="with-best"):
-        assert ", statistically tied for best in its column (95 % confidence)" in cell.text
+        assert ", statistically tied for best in its column (95% confidence)" in cell.text
     legend = root.one("details", class_="legend").text
     assert re.search(r"values with 95% confidence intervals \(bootstrap over [\d,]+ recordings\)", legend)
     assert "Rows quoted from papers (rings) have no confidence interval" in legend
