@@ -24,7 +24,7 @@ from leaderboard.web.boards.whiskers import WhiskerScale
 
 SCORED_DECIMALS: Final = 2
 NOTHING: Final = SafeString("")
-MARKED: Final = "statistically tied for best in its column (95 % confidence)"
+MARKED: Final = "statistically tied for best in its column (95% confidence)"
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Cell:
     is_best: bool = False
     is_second: bool = False
     is_with_best: bool = (
-        False  # statistically tied for best in its column (95 % confidence): its rank range begins at 1
+        False  # statistically tied for best in its column (95% confidence): its rank range begins at 1
     )
     interval: str = ""  # in words
     whisker: SafeString = NOTHING
@@ -68,7 +68,7 @@ class Cell:
     def hint(self) -> str:
         """Return the interval and the mark for hover."""
         hints = (
-            f"95 % confidence interval: {self.interval}" if self.interval else "",
+            f"95% confidence interval: {self.interval}" if self.interval else "",
             MARKED * self.is_with_best,
         )
         return "; ".join(filter(None, hints))

@@ -113,7 +113,7 @@ def truncation(truncated: Mapping[str, int]) -> str:
     moved = {boundary: n for boundary, n in truncated.items() if n}
     n_moved = sum(moved.values())
     if not moved:
-        return "No prediction was truncated."
+        return "Nothing was truncated."
     where = ", ".join(f"{grouped(n)} to {boundary.replace('-', '−')} s" for boundary, n in moved.items())
     subject = "1 prediction" if n_moved == 1 else f"{grouped(n_moved)} predictions"
     verb = "was" if n_moved == 1 else "were"

@@ -44,13 +44,15 @@ def test_its_values_are_those_of_the_board(client: Client, method: Method) -> No
         row for row in pages.board_rows(pages.page(client.get("/board/test/"))) if row[1].startswith("Foo")
     ]
     main = get(client, method).one("main")
-    values = [
-        cell.text.removesuffix(" best").removesuffix(" second")
-        for half in main.one("div", class_="result").all("table")
-        for cell in half.one("tbody").all("tr")[0].all("td")
+    by_range = [
+        [cell.text.removesuffix(" best").removesuffix(" second") for cell in each.all("td", class_="score")]
+        for each in main.one("div", class_="result").one("tbody").all("tr")
     ]
-    assert values == row[2:]
-    assert f"rank {row[0]} of 6" in main.one("h2").text
+    mids, rtes = zip(*by_range, strict=True)
+    assert [*mids, *rtes] == row[2:]
+    card = main.one("dl", class_="score-card").text
+    assert row[2] in card
+    assert f"Rank{row[0]} of 6" in card
 
 
 def test_each_split_stands_in_its_own_section(
