@@ -180,7 +180,7 @@ def against(entry: Entry, others: Sequence[Entry], *, edition: Edition) -> tuple
     tested = [(entry, other) for other in others if not whys[other.id]]
     withheld, known = _withheld(edition, tested), _known(edition, [each for pair in tested for each in pair])
     new = [key for key in map(_key, tested) if key not in withheld and key not in known]
-    questions.note(edition=edition, pairs=new)
+    comparison_queue.add(edition=edition, pairs=new)
     pairs = {pair.second.id: pair for pair in _pairs(tested, known, withheld)}
     for other in others:
         if why := whys[other.id]:
