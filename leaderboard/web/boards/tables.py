@@ -102,6 +102,11 @@ class BoardTable:
     floor: str  # what the ground truth itself scores, in words; empty where that is not known
 
     @property
+    def is_narrow(self) -> bool:
+        """Tell whether its few columns leave a wide page empty."""
+        return len(self.score_headings) + sum(bool(each.axis) for each in self.score_headings) <= 7
+
+    @property
     def has_private_rows(self) -> bool:
         return any(not row.entry.is_visible_to_all for row in self.rows)
 
