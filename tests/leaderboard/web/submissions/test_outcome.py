@@ -1,5 +1,7 @@
 """What a submission's page says beyond the numbers: rank, comparison, a row for a paper, its cost."""
 
+import re
+
 import pytest
 from django.db import connection
 from django.test import Client
@@ -60,7 +62,7 @@ def test_maintainer_reads_the_same_rank_of_a_private_one(
 ) -> None:
     sent = builders.submit(owner, builders.predictions(edition, factor=1.01), visibility="PRIVATE")
     builders.score_all()
-    assert "Rank if published1 of" in card(look(keeper, sent))
+    assert "Rank if public1 of" in card(look(keeper, sent))
 
 
 @pytest.mark.parametrize("visibility", ["PUBLIC", "PRIVATE"])
@@ -152,6 +154,19 @@ def test_latex_row_is_that_of_the_boards_table(signed_in: Client, inferred: list
     board = signed_in.get("/board/test.tex").content.decode()
     assert row in board.splitlines()
     assert " & M1.1 & Owls & " in row
+
+
+def test_score_is_quoted_in_one_line_and_no_interval_breaks(
+    signed_in: Client, inferred: list[Submission]
+) -> None:
+    root = look(signed_in, inferred[1])
+    quoted = root.one("code", id="citation").text
+    assert re.fullmatch(r"MiD ([0-9.]+) \[[0-9.]+, [0-9.]+\], rank \d( \(\d–\d\))?, test, edition 1", quoted)
+    cells = root.one("div", class_="result").all("td", class_="span")
+    assert all(
+        re.fullmatch(r"[0-9.]+–[0-9.]+", cell.all("span")[0].text) for cell in cells if cell.text != "–"
+    )
+    assert len(root.one("figure", class_="all-values").all("svg")) == 2
 
 
 # --- what a rejected file costs --------------------------------------------------------------------------
