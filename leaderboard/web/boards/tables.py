@@ -249,6 +249,6 @@ def _text_heading(name: str, query: BoardQuery) -> Heading:
 def _attempts(entry: Entry) -> str:
     if entry.n_attempts is None:
         return ""
-    noun = "attempt" if entry.n_attempts == 1 else "attempts"
+    noun = "submission" if entry.n_attempts == 1 else "submissions"
     is_of_team = entry.visibility == Visibility.PUBLIC
     return f"{entry.n_attempts:,} {'team ' if is_of_team else ''}{noun}"

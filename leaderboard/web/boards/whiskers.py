@@ -1,4 +1,4 @@
-"""Small drawings beside numbers: values with their intervals on one scale, and values over time.
+"""Small drawings next to numbers: values with their intervals on one scale, and values over time.
 
 Drawings are sized in percent, so the same bytes fit every screen; the cell has the numbers as text.
 """

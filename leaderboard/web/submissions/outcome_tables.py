@@ -135,7 +135,7 @@ def rejected_sentence(quota: Quota | None) -> str:
 
     >>> from leaderboard.models import QuotaOverride
     >>> rejected_sentence(Quota("test", QuotaOverride(quota_rejected_limit=20), 0, 3, True, None, ""))
-    'This did not count against your quota. Up to 20 files may be rejected within 24 hours; 17 are left.'
+    'This did not count against your quota. Up to 20 files may be rejected within 24 hours; 17 left.'
     """
     if quota is None:
         return ""
@@ -146,5 +146,5 @@ def rejected_sentence(quota: Quota | None) -> str:
     return (
         "This did not count against your quota. "
         f"Up to {counted(limit, 'file')} may be rejected within 24 hours; "
-        f"{counted(n_left, 'is', 'are')} left."
+        f"{n_left:,} left."
     )

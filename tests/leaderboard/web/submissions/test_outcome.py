@@ -173,7 +173,7 @@ def test_score_is_quoted_in_one_line_and_no_interval_breaks(
 
 
 @pytest.mark.parametrize(
-    ("limit", "left"), [(20, ". Up to 20 files may be rejected within 24 hours; 19 are left."), (None, ".")]
+    ("limit", "left"), [(20, ". Up to 20 files may be rejected within 24 hours; 19 left."), (None, ".")]
 )
 def test_rejected_file_uses_no_quota_and_page_says_how_many_more_are_taken(
     signed_in: Client, edition: Edition, owner: User, limit: int | None, left: str

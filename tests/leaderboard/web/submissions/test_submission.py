@@ -166,8 +166,8 @@ def test_our_own_failure_is_called_ours(signed_in: Client, submission: Submissio
     root = get(signed_in, PAGE, submission)
     assert "System error" in current_step(root)
     assert "error on our side" in root.one("main").text
-    assert "You do not need to submit it again" in root.one("main").text
-    assert "your quota is not used" in root.one("main").text
+    assert "you don’t need to submit it again" in root.one("main").text
+    assert "it does not count against your quota" in root.one("main").text
 
 
 def test_one_that_waits_far_too_long_says_so_and_that_nothing_is_lost(
