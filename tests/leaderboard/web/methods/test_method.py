@@ -115,7 +115,7 @@ def test_head_says_the_score_its_lead_and_the_way_there(client: Client, method: 
     assert "2 submissions over time" in card.text
     assert len(card.all("svg", class_="sparkline")) == 1
     strip = main.one("figure", class_="all-values")
-    assert strip.attributes["aria-label"] == "MiD of all methods: 0 lower, 5 not."
+    assert strip.one("span", class_="spoken").text == "MiD of all methods: 0 lower, 5 not."
     assert len(strip.one("svg", class_="strip").all("line", class_="own")) == 1
 
 
