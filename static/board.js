@@ -24,6 +24,13 @@ document.addEventListener("htmx:afterSettle", () => {
 
 // --- menus close where one clicks beside them, and with Escape -------------------------------------------
 
+// A menu ends above the tray and the end of the window.
+document.addEventListener("toggle", ({ target }) => {
+  const body = target.open && target.matches("details.menu") && target.querySelector(".menu-body");
+  if (!body) return;
+  const end = tray && !tray.hidden ? tray.getBoundingClientRect().top : innerHeight;
+  body.style.maxHeight = `${Math.max(160, end - body.getBoundingClientRect().top - 8)}px`;
+}, true);
 const closeMenus = (except) => {
   for (const menu of document.querySelectorAll("details.menu[open]")) if (menu !== except) menu.open = false;
 };

@@ -363,7 +363,9 @@ class BoardSerializer(serializers.Serializer[Board]):
     )
     at = serializers.DateTimeField(allow_null=True, help_text="Time requested by `at`; null: now.")
     updated_at = serializers.DateTimeField(
-        allow_null=True, help_text="When the newest row was added, or the edition published."
+        allow_null=True,
+        help_text="When the newest row was added, or the edition published; the end of the day for an "
+        "anonymous row.",
     )
     is_open = serializers.BooleanField(help_text="Whether the split accepts submissions.")
     opens_at = serializers.DateTimeField(source="split.opens_at", allow_null=True, help_text=OPENS_AT)

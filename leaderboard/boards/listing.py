@@ -81,9 +81,9 @@ class Board:
     entries: tuple[Entry, ...]
     sort: str = "rank"
     at: datetime | None = None
-    updated_at: datetime | None = None
+    updated_at: datetime | None = None  # the end of the day of an anonymous row
     is_open: bool = field(default=False)
-    deadline: str = ""  # in a sentence, where there is one
+    label: str = ""  # whether it is open, where that is worth a word
     filters: Filters = field(default_factory=Filters)
     unfiltered: tuple[Entry, ...] = ()  # all rows, before the filters, in no order
     n_submissions: int = 0  # those of them that are submissions
@@ -92,6 +92,11 @@ class Board:
     @property
     def n_in_all(self) -> int:
         return len(self.unfiltered)
+
+    @property
+    def is_updated_by_day(self) -> bool:
+        """Tell whether only the day of its last change is published, for an anonymous row."""
+        return self.updated_at is not None and self.updated_at.time() == time.max
 
     @property
     def rules(self) -> Protocol:
@@ -146,7 +151,11 @@ def board(
     entries = with_own(shown, split=split, edition=edition, viewer=viewer, at=at)
     filters, now = filters or Filters(), timezone.now()
     n_submissions = sum(entry.kind == "submission" for entry in entries)
-    dates = [entry.listed_at for entry in entries if entry.listed_at]
+    dates = [
+        days.known_until(entry.listed_at, is_masked=entry.visibility == Visibility.ANONYMOUS)
+        for entry in entries
+        if entry.listed_at
+    ]
     if edition and edition.published_at:
         dates.append(edition.published_at)
     return Board(
@@ -157,7 +166,7 @@ def board(
         at=at,
         updated_at=max(dates, default=None),
         is_open=admissions.is_open(split, now=now),
-        deadline=admissions.sentence_of(split, now=now),
+        label=admissions.label_of(split, now=now),
         filters=filters,
         unfiltered=entries,
         n_submissions=n_submissions,

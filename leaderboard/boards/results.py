@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 from django.contrib.auth.models import AnonymousUser
 
+from evaluator.metrics import registry
 from leaderboard.boards import listing, snapshots
-from leaderboard.boards.rows import Entry, Profile, profile_of
+from leaderboard.boards.rows import Entry, Profile, placed, profile_of
 from leaderboard.boards.snapshots import Attempt
 from leaderboard.models import Edition, Method, Split, User
 
@@ -25,7 +26,15 @@ class Result:
     entry: Entry
     n_ranked: int
     attempts: tuple[Attempt, ...]  # its active, scored submissions, the newest first
-    neighbours: tuple[Entry, ...]  # of the rows that everybody sees, up to two of the nearest rank
+    rows: tuple[Entry, ...]  # those that everybody sees
+    best: Entry | None  # of the others among them; None without any
+    neighbours: tuple[Entry, ...]  # up to two of them, of the nearest rank
+
+    @property
+    def rivals(self) -> tuple[Entry, ...]:
+        """The best of the others and the neighbours, each once."""
+        first = (self.best,) if self.best else ()
+        return tuple({other.id: other for other in (*first, *self.neighbours)}.values())
 
 
 def results(
@@ -49,18 +58,27 @@ def results(
         # What is private is not among what everybody sees.
         own = snapshots.attempts(edition, methods=Method.objects.filter(pk=method.pk)) if not is_shown else ()
         attempts = own or tuple(each for each in drawn.attempts if each.method_id == method.pk)
-        neighbours = _neighbours(entry, drawn.entries)
-        per_split.append(Result(split, edition, entry, n_ranked, attempts, neighbours))
+        others = _others(entry, drawn.entries)
+        best = others[0] if others else None
+        neighbours = _neighbours(entry, others)
+        edition.split = split  # It is at hand, and would be asked for again.
+        per_split.append(Result(split, edition, entry, n_ranked, attempts, drawn.entries, best, neighbours))
     return tuple(per_split)
 
 
-def _neighbours(entry: Entry, rows: Sequence[Entry]) -> tuple[Entry, ...]:
-    """The row before and the row after; at an end of the board the two next to it."""
+def _others(entry: Entry, rows: Sequence[Entry]) -> list[Entry]:
+    """The other rows with a value, the best first, ranked as if the entry were among what everybody sees."""
     value = entry.value
-    others = [row for row in rows if row.method_id != entry.method_id and row.value is not None]
     if value is None:
-        return ()
-    others.sort(key=lambda row: row.value or 0.0)
-    n_better = sum((row.value or 0.0) < value for row in others)
+        return []
+    others = [row for row in rows if row.method_id != entry.method_id and row.value is not None]
+    ranks = registry.rank([value, *(row.value for row in others)])[1:]
+    ranked = [placed(row, rank) for row, rank in zip(others, ranks, strict=True)]
+    return sorted(ranked, key=lambda row: row.value or 0.0)
+
+
+def _neighbours(entry: Entry, others: Sequence[Entry]) -> tuple[Entry, ...]:
+    """The row before and the row after; at an end of the board the two next to it."""
+    n_better = sum((row.value or 0.0) < (entry.value or 0.0) for row in others)
     first = min(max(n_better - 1, 0), max(len(others) - 2, 0))
     return tuple(others[first : first + 2])

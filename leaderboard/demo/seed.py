@@ -58,7 +58,7 @@ class DemoEntry:
     def full_description(self) -> str:
         if self.run is None:
             return self.description
-        return f"{self.description} {_RENDERED}\n\nCommands:\n{FRAMES}\n{self.run.command}"
+        return f"{self.description} {_RENDERED}\n\nCommands:\n\n```\n{FRAMES}\n{self.run.command}\n```"
 
 
 def _measured(n_frames: int, **others: object) -> Mapping[str, object]:

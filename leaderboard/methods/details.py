@@ -255,6 +255,14 @@ class Detail:
     filter: str
     example: Any
     filter_example: str = ""
+    chip: str = ""  # around a value that stands alone, as "{} frames"; of yes or no the noun
+    is_in_row: bool = False  # a row of a board shows it
+
+    def words_alone(self, value: Any) -> str:
+        """Word a value so that it needs no label."""
+        if self.kind is YES_NO and self.chip:
+            return self.chip if value else f"no {self.chip}"
+        return (self.chip or f"{self.label}: {{}}").format(self.kind.words(value))
 
     @property
     def filter_label(self) -> str:
@@ -280,6 +288,8 @@ DETAILS: tuple[Detail, ...] = (
         help="Number of frames used.",
         filter="frames",
         example=6,
+        chip="{} frames",
+        is_in_row=True,
     ),
     Detail(
         name="cameras",
@@ -288,6 +298,8 @@ DETAILS: tuple[Detail, ...] = (
         help="Camera views used.",
         filter="cameras",
         example="ONE",
+        chip="{}",
+        is_in_row=True,
     ),
     Detail(
         name="box_source",
@@ -296,6 +308,7 @@ DETAILS: tuple[Detail, ...] = (
         help="Source of the object's bounding box.",
         filter="boxes",
         example="GIVEN",
+        chip="boxes: {}",
     ),
     Detail(
         name="uses_nerf",
@@ -304,6 +317,8 @@ DETAILS: tuple[Detail, ...] = (
         help="Whether trained with the NeRF-rendered sequences.",
         filter="nerf",
         example=False,
+        chip="NeRF",
+        is_in_row=True,
     ),
     Detail(
         name="uses_extra_data",
@@ -312,6 +327,7 @@ DETAILS: tuple[Detail, ...] = (
         help="Whether trained with data from elsewhere.",
         filter="extra",
         example=False,
+        chip="external data",
     ),
     Detail(
         name="pretraining",
@@ -320,6 +336,7 @@ DETAILS: tuple[Detail, ...] = (
         help="What the weights were trained on before, such as “ImageNet-1k”.",
         filter="pretraining",
         example="ImageNet",
+        chip="pretrained on {}",
     ),
     Detail(
         name="n_parameters",
@@ -329,6 +346,7 @@ DETAILS: tuple[Detail, ...] = (
         filter="parameters",
         example=25_000_000,
         filter_example="25M",
+        chip="{} parameters",
     ),
     Detail(
         name="latency_ms",
@@ -337,6 +355,7 @@ DETAILS: tuple[Detail, ...] = (
         help="Milliseconds per prediction, above 0; needs the hardware.",
         filter="latency",
         example=12.5,
+        chip="{} ms latency",
     ),
     Detail(
         name="hardware",
@@ -345,6 +364,7 @@ DETAILS: tuple[Detail, ...] = (
         help="Hardware on which the latency was measured.",
         filter="hardware",
         example="one RTX 4090",
+        chip="{}",
     ),
 )
 
@@ -366,4 +386,20 @@ def words(details: Details) -> tuple[tuple[str, str], ...]:
         (each.label, each.kind.words(details[each.name]))
         for each in DETAILS
         if details[each.name] != each.kind.empty
+    )
+
+
+def chips(details: Details, *, of_row: bool = False) -> tuple[tuple[str, str], ...]:
+    """Return label and words of each specified detail, short; of a row not what is answered with no.
+
+    >>> chips(stated(n_frames=2, uses_nerf=False, latency_ms=5.7))
+    (('Frames used', '2 frames'), ('NeRF-augmented data', 'no NeRF'), ('Latency (ms)', '5.7 ms latency'))
+    >>> chips(stated(n_frames=2, uses_nerf=False, latency_ms=5.7), of_row=True)
+    (('Frames used', '2 frames'),)
+    """
+    return tuple(
+        (each.label, each.words_alone(details[each.name]))
+        for each in DETAILS
+        if details[each.name] != each.kind.empty
+        if not of_row or (each.is_in_row and details[each.name] is not False)
     )

@@ -89,6 +89,20 @@ def sentence_of(split: Split, *, now: datetime) -> str:
     return str(refusal_for_all(split, now=now) or closing_of(split))
 
 
+def label_of(split: Split, *, now: datetime) -> str:
+    """Say the same in a few words; empty for a split that is open without an end."""
+    opens_at, closes_at = split.opens_at, split.closes_at
+    if split.is_archived:
+        return "Archived: closed for submissions"
+    if not split.has_ground_truth:
+        return "Not open for submissions yet"
+    if opens_at and now < opens_at:
+        return f"Opens for submissions {opens_at:%Y-%m-%d %H:%M} UTC"
+    if closes_at and now >= closes_at:
+        return f"Closed for submissions since {closes_at:%Y-%m-%d}"
+    return f"Open for submissions until {closes_at:%Y-%m-%d %H:%M} UTC" if closes_at else ""
+
+
 def closing_of(split: Split) -> str:
     """Say until when an open split takes submissions; may be empty."""
     at = split.closes_at

@@ -26,6 +26,7 @@ MIN_METHODS, MAX_METHODS = 2, 5
 N_FIRST = 20
 # Beside the differences of a pair of which a worker tells no more, why it does not.
 WITHHELD = "withheld"
+QUOTED = "A row quoted from a paper cannot be tested: papers report no values per recording."
 
 
 class BadComparison(Exception):
@@ -167,6 +168,26 @@ def of_first(*, board: listing.Board) -> tuple[Pair, ...]:
     new = [key for key in map(_key, pairs) if key not in withheld and key not in known]
     comparison_queue.add(edition=board.edition, pairs=new)
     return _pairs(pairs, known, withheld)
+
+
+def against(entry: Entry, others: Sequence[Entry], *, edition: Edition) -> tuple[Pair, ...]:
+    """Return the pairs of an entry with each of the others; queue unknown ones last.
+
+    With a quoted row, and where there are too few units, the pair has the differences of the values alone.
+    """
+    reason = confidence.why_no_interval(edition)
+    whys = {other.id: reason if other.evaluation_id else QUOTED for other in others}
+    tested = [(entry, other) for other in others if not whys[other.id]]
+    withheld, known = _withheld(edition, tested), _known(edition, [each for pair in tested for each in pair])
+    new = [key for key in map(_key, tested) if key not in withheld and key not in known]
+    comparison_queue.add(edition=edition, pairs=new)
+    pairs = {pair.second.id: pair for pair in _pairs(tested, known, withheld)}
+    for other in others:
+        if why := whys[other.id]:
+            decimals = max(entry.decimals, other.decimals)
+            shown = _differences_of_values(entry.scores, other.scores, decimals=decimals)
+            pairs[other.id] = Pair(entry, other, shown, withheld=why)
+    return tuple(pairs[other.id] for other in others)
 
 
 def neighbours(pairs: Sequence[Pair]) -> list[Pair]:

@@ -1,5 +1,6 @@
 """Times and counts on every page."""
 
+import re
 from datetime import UTC, datetime
 
 from django.utils.html import format_html, format_html_join
@@ -53,6 +54,25 @@ def ticked(text: str) -> SafeString:
     parts = text.split("`")
     pieces = (part if i % 2 == 0 else format_html("<code>{}</code>", part) for i, part in enumerate(parts))
     return format_html_join("", "{}", ((piece,) for piece in pieces))
+
+
+def paragraphs(text: str) -> SafeString:
+    """Turn a plain text into paragraphs: backticks are code, three around a paragraph a block.
+
+    >>> paragraphs("Needs `tsttc`.")
+    '<p>Needs <code>tsttc</code>.</p>'
+    >>> paragraphs("A < B\\r\\nC\\n\\n```\\ntsttc check\\n```")
+    '<p>A &lt; B<br>C</p><pre><code>tsttc check</code></pre>'
+    """
+    parts = re.split(r"\n{2,}", text.strip().replace("\r\n", "\n"))
+    return format_html_join("", "{}", ((_paragraph(part),) for part in parts))
+
+
+def _paragraph(text: str) -> SafeString:
+    if len(text) > 6 and text.startswith("```") and text.endswith("```"):
+        return format_html("<pre><code>{}</code></pre>", text[3:-3].strip())
+    lines = ((ticked(line),) for line in text.split("\n"))
+    return format_html("<p>{}</p>", format_html_join(SafeString("<br>"), "{}", lines))
 
 
 def breakable(path: str) -> SafeString:

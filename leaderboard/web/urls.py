@@ -79,7 +79,7 @@ urlpatterns = [
     ),
     path("submissions/<uuid:submission_id>/receipt.jwt", submission_views.receipt, name="receipt"),
     path("submissions/<uuid:submission_id>/withdraw/", submission_views.withdraw, name="withdraw"),
-    path("methods/<uuid:method_id>/", cacheable(method_views.method), name="method"),
+    path("methods/<uuid:method_id>/", method_views.method, name="method"),
     path("compare/", compare_views.compare, name="compare"),
     path("methods/<uuid:method_id>/edit/", method_views.edit, name="method_edit"),
     path("methods/<uuid:method_id>/delete/", method_views.delete, name="method_delete"),

@@ -24,6 +24,12 @@ HEAD_TOP_PX = """() => {
   scrollTo(0, document.querySelector("table.board tbody tr:nth-child(40)").offsetTop);
   return document.querySelector("table.board thead").getBoundingClientRect().top;
 }"""
+FIRST_ROW_PX = 'document.querySelector("table.board tbody tr").getBoundingClientRect().top'
+ADD_TWO_SPLITS = """() => {
+  const tabs = document.querySelector(".splits");
+  for (const title of ["Winter challenge 2027", "Fog and rain"])
+    tabs.append(Object.assign(tabs.lastElementChild.cloneNode(), {textContent: title}));
+}"""
 
 
 def faults_at_every_width(page: Page) -> list[str]:
@@ -125,3 +131,41 @@ def test_menu_and_legend_open_and_close_by_keyboard_and_an_export_is_copied(
         menu.locator("summary").click()
         menu.get_by_role("link", name="Download Markdown", exact=True).click()
     assert download.value.suggested_filename == "tsttc-demo-edition-1.md"
+
+
+def test_first_row_is_above_the_fold_and_the_tabs_of_five_splits_fit_a_phone(page: Page, board: None) -> None:
+    page.goto(BOARD)
+    page.evaluate(ADD_TWO_SPLITS)
+    # The second is the first at 200 %, of which two screens are the most.
+    for width, height, limit_px in ((1440, 900, 330), (720, 450, 2 * 450)):
+        page.set_viewport_size({"width": width, "height": height})
+        assert page.evaluate(FIRST_ROW_PX) < limit_px
+    page.set_viewport_size(NARROW)
+    assert page.evaluate(OVERFLOW_PX) == 0
+
+
+def test_export_menu_ends_above_the_tray(page: Page, board: None) -> None:
+    page.set_viewport_size({"width": 1024, "height": 500})
+    page.goto(BOARD)
+    page.locator("table.board tbody input[type=checkbox]").first.check()
+    page.locator(".exports summary").click()
+    menu, tray = page.locator(".exports .menu-body").bounding_box(), page.locator("#tray").bounding_box()
+    assert menu is not None
+    assert tray is not None
+    assert menu["y"] + menu["height"] <= tray["y"]
+
+
+def test_without_scripts_no_heading_stands_over_a_chart_that_is_not_there(
+    new_page: NewPage, board: None
+) -> None:
+    page = new_page(java_script_enabled=False)
+    page.goto(BOARD)
+    expect(page.get_by_role("heading", name="Progress over time")).to_be_hidden()
+
+
+def test_on_paper_no_number_lies_over_its_neighbour(page: Page, board: None) -> None:
+    page.set_viewport_size({"width": 1045, "height": 740})
+    page.goto(BOARD)
+    page.emulate_media(media="print")
+    assert page.evaluate(SPILLED) == []
+    expect(page.get_by_role("heading", name="Progress over time")).to_be_hidden()

@@ -11,8 +11,10 @@ from django.views.decorators.http import require_safe
 
 from leaderboard.boards import snapshots
 from leaderboard.boards.listing import Board, UnknownColumn
+from leaderboard.boards.snapshots import splits_of
 from leaderboard.editions import history
 from leaderboard.models import Edition, Split
+from leaderboard.quotas import admissions
 from leaderboard.web.boards import board_query, edition_tables, export_views, tables
 from leaderboard.web.boards.board_query import BoardQuery, tools
 from leaderboard.web.boards.rank_ladder import rank_ladder
@@ -50,6 +52,10 @@ def render_board(
         ),
         "ladder": rank_ladder(shown.unfiltered, primary=shown.rules.score_names[0]),
         "exports": export_views.offers(shown, edition, query),
+        # Where one can submit instead.
+        "open_splits": []
+        if shown.is_open
+        else [each for each in splits_of(request) if admissions.is_open(each, now=now)],
         "progress_label": f"{primary} of each method by date, with the lowest {primary} so far.",
         "n_withdrawn": sum(entry.withdrawn_at is not None for entry in shown.unfiltered),
     }

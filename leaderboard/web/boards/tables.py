@@ -14,6 +14,7 @@ from leaderboard.boards import movement
 from leaderboard.boards.listing import Board
 from leaderboard.boards.rows import Entry
 from leaderboard.exports.tables import team_of
+from leaderboard.methods import details
 from leaderboard.models import Edition, Visibility
 from leaderboard.statistics import confidence
 from leaderboard.web.boards import whiskers
@@ -50,6 +51,7 @@ class BoardRow:
     source_number: int | None
     note: str  # why it stays in a former edition
     attempts: str
+    chips: tuple[tuple[str, str], ...]
     is_new: bool
     moved: int  # ranks risen in a month; fallen: below 0
 
@@ -100,6 +102,11 @@ class BoardTable:
     floor: str  # what the ground truth itself scores, in words; empty where that is not known
 
     @property
+    def is_narrow(self) -> bool:
+        """Tell whether its few columns leave a wide page empty."""
+        return len(self.score_headings) + sum(bool(each.axis) for each in self.score_headings) <= 7
+
+    @property
     def has_private_rows(self) -> bool:
         return any(not row.entry.is_visible_to_all for row in self.rows)
 
@@ -138,6 +145,7 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
             source_number=numbers.get(entry.source),
             note=_note(entry, board.split.current_edition),
             attempts=_attempts(entry),
+            chips=details.chips(entry.details, of_row=True),
             is_new=entry.method_id in new,
             moved=moved.get(entry.method_id, 0) if entry.method_id else 0,
         )
@@ -241,6 +249,6 @@ def _text_heading(name: str, query: BoardQuery) -> Heading:
 def _attempts(entry: Entry) -> str:
     if entry.n_attempts is None:
         return ""
-    noun = "attempt" if entry.n_attempts == 1 else "attempts"
+    noun = "submission" if entry.n_attempts == 1 else "submissions"
     is_of_team = entry.visibility == Visibility.PUBLIC
     return f"{entry.n_attempts:,} {'team ' if is_of_team else ''}{noun}"

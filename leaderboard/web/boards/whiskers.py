@@ -1,8 +1,9 @@
-"""The column of confidence intervals: each row's value and interval on one scale, over that of the best row.
+"""Small drawings next to numbers: values with their intervals on one scale, and values over time.
 
 Drawings are sized in percent, so the same bytes fit every screen; the cell has the numbers as text.
 """
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -121,6 +122,31 @@ def axis(scale: WhiskerScale) -> SafeString:
     marks = format_html_join("", '<line x1="{0}%" x2="{0}%" y1="13" y2="17"/>', ((at,) for at, _ in ticks))
     texts = format_html_join("", '<text x="{}%" y="10" text-anchor="middle">{}</text>', ticks)
     return _svg("axis", [marks, texts])
+
+
+def strip(values: Iterable[float], *, own: float) -> SafeString:
+    """Draw a tick for each value on one scale with its axis, and a larger one for the own value."""
+    known = sorted({*values, own})
+    scale = WhiskerScale(known[0], max(known[-1], known[0] + 1e-9))
+    ticks = dict.fromkeys(f"{scale.percent(value):g}" for value in known)
+    others = format_html_join("", '<line x1="{0}%" x2="{0}%" y1="8" y2="20"/>', ((at,) for at in ticks))
+    mine = format_html('<line class="own" x1="{0}%" x2="{0}%" y1="0" y2="26"/>', f"{scale.percent(own):g}")
+    return format_html("{}{}", _svg("strip", [others, mine]), axis(scale))
+
+
+def sparkline(values: Sequence[float]) -> SafeString:
+    """Draw values in their order as a line, the lowest marked."""
+    low = min(values)
+    heights = WhiskerScale(low, max(low + 1e-9, *values))
+    spread = WhiskerScale(0.0, max(1.0, len(values) - 1.0))
+    points = [(f"{spread.percent(i):g}", f"{100 - heights.percent(v):g}") for i, v in enumerate(values)]
+    lines = format_html_join(
+        "",
+        '<line x1="{}%" y1="{}%" x2="{}%" y2="{}%"/>',
+        ((*one, *following) for one, following in itertools.pairwise(points)),
+    )
+    best = format_html('<circle cx="{}%" cy="{}%" r="3.4"/>', *points[values.index(low)])
+    return _svg("sparkline", [lines, best])
 
 
 def _band(scale: WhiskerScale) -> SafeString:

@@ -1,6 +1,6 @@
 """Pages of a method: results for everybody; details and visibility for its team."""
 
-from typing import cast
+from typing import Any, cast
 from uuid import UUID
 
 from django.contrib import messages
@@ -11,14 +11,16 @@ from django.views.decorators.http import require_safe
 
 from leaderboard.boards import results, visibility_preview
 from leaderboard.boards.snapshots import splits_of
+from leaderboard.http_caching import cacheable
 from leaderboard.methods import details, editing, visibility
 from leaderboard.models import Method, Split, Submission, User, Visibility
 from leaderboard.moderation import empty_methods
+from leaderboard.statistics import comparisons
 from leaderboard.web.boards import export_views
 from leaderboard.web.decorators import own_form
 from leaderboard.web.forms import ConfirmForm
 from leaderboard.web.methods.method_forms import MethodForm, ShowForm
-from leaderboard.web.methods.result_tables import edition_groups, method_result
+from leaderboard.web.methods.result_tables import edition_table, method_result
 
 
 @require_safe
@@ -29,18 +31,27 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
     profile = results.profile(method=row, viewer=request.user)
     is_mine = Method.objects.of(request.user).filter(pk=row.pk).exists()
     sent_to = _sent_to(request, row) if is_mine and not achieved else None
+    pairs = [comparisons.against(result.entry, result.rivals, edition=result.edition) for result in achieved]
     context = {
         "profile": profile,
-        "details": details.words(profile.details),
+        "chips": details.chips(profile.details),
         "visibility": row.visibility,
         "is_named": row.is_named_for(request.user),
         "is_mine": is_mine,
         "method_id": row.pk,
-        "results": [method_result(result) for result in achieved],
+        "results": [
+            method_result(result, of_result) for result, of_result in zip(achieved, pairs, strict=True)
+        ],
         "sent_to": sent_to,
         "board_split": achieved[0].split.pk if achieved else sent_to.pk if sent_to else "",
         **export_views.of_method(achieved),
     }
+    # What is being computed changes by itself.
+    is_complete = all(pair.differences is not None for of_result in pairs for pair in of_result)
+    return (cacheable(_drawn) if is_complete else _drawn)(request, context)
+
+
+def _drawn(request: HttpRequest, context: dict[str, Any]) -> HttpResponse:
     return render(request, "methods/method.html", context)
 
 
@@ -105,7 +116,7 @@ def change_visibility(request: HttpRequest, method_id: UUID) -> HttpResponse:
         context["preview"] = preview
         context["preview_label"] = Visibility(preview.visibility).label
         context["details"] = details.words(preview.profile.details)
-        context["boards"] = [(board, edition_groups(board.entry, board.edition)) for board in preview.boards]
+        context["boards"] = [(board, edition_table(board.entry, board.edition)) for board in preview.boards]
     return render(request, "methods/visibility.html", context, status=422 if form.errors else 200)
 
 

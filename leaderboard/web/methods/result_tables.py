@@ -1,78 +1,92 @@
 """Tables of results of methods and submissions, with the counts behind each number."""
 
-import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import shorten
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 from urllib.parse import urlencode
 
 from django.urls import reverse
 
-from evaluator.metrics.protocol import OVERALL
+from evaluator.metrics.protocol import OVERALL, grouped_names
+from evaluator.metrics.registry import Metric
 from evaluator.scoring.results import format_rounded
 from evaluator.tables import sentences
 from leaderboard.boards.results import Result
 from leaderboard.boards.rows import Entry, flat_scores
 from leaderboard.models import Edition, Evaluation, Status, Submission
-from leaderboard.statistics.comparisons import MIN_METHODS
+from leaderboard.statistics.comparisons import MIN_METHODS, Pair
 from leaderboard.submissions.progress import evaluation_of
+from leaderboard.web.boards import whiskers
 from leaderboard.web.boards.score_columns import (
     Cell,
-    Group,
     Heading,
     cell_css,
     score_cells,
-    score_groups,
     score_heading,
 )
 from leaderboard.web.boards.tables import rank_range
-from leaderboard.web.charts import profile_chart
 from leaderboard.web.formatting import grouped
+from leaderboard.web.methods.score_cards import gap_of, score_card
 
 _MAX_REASON: Final = 110
 
 
-@dataclass(frozen=True)
-class ResultGroup:
-    """A metric of one result, and its columns."""
+class RangeRow(NamedTuple):
+    """The scores of one result over one TTC range, a cell for each metric."""
 
-    group: Group
-    columns: tuple[tuple[Heading, Cell, str], ...]  # each with the number of sequences behind it
+    heading: Heading
+    cells: tuple[Cell, ...]
+    n_sequences: str  # of the sequences in it
+
+
+@dataclass(frozen=True)
+class ResultTable:
+    """The numbers of one result: a row for each TTC range, a column for each metric."""
+
+    metrics: tuple[Metric, ...]
+    rows: tuple[RangeRow, ...]
 
     @property
     def has_intervals(self) -> bool:
-        return any(cell.interval for _, cell, _ in self.columns)
+        return any(cell.interval for row in self.rows for cell in row.cells)
 
     @property
     def has_with_best(self) -> bool:
-        return any(cell.is_with_best for _, cell, _ in self.columns)
+        return any(cell.is_with_best for row in self.rows for cell in row.cells)
 
 
-def result_groups(entry: Entry, counts: Mapping[str, int]) -> tuple[ResultGroup, ...]:
+def result_table(entry: Entry, counts: Mapping[str, int]) -> ResultTable:
     """Return the numbers of one result, with the number of sequences behind each."""
-    headings = [score_heading(name, primary=entry.primary) for name in entry.scores]
-    columns = iter(
-        (heading, cell, grouped(counts.get(heading.caption)))
-        for heading, cell in zip(headings, score_cells(entry), strict=True)
-    )
-    return tuple(
-        ResultGroup(group=group, columns=tuple(itertools.islice(columns, group.n_columns)))
-        for group in score_groups(entry.scores)
+    columns = grouped_names(entry.scores)
+    cells = [score_cells(entry, names=names) for names in columns.values()]
+    headings = [score_heading(name, primary=entry.primary) for name in next(iter(columns.values()))]
+    return ResultTable(
+        metrics=tuple(columns),
+        rows=tuple(
+            RangeRow(heading, tuple(of_range), grouped(counts.get(heading.caption)))
+            for heading, *of_range in zip(headings, *cells, strict=True)
+        ),
     )
 
 
-def edition_groups(entry: Entry, edition: Edition) -> tuple[ResultGroup, ...]:
+def edition_table(entry: Entry, edition: Edition) -> ResultTable:
     truth = edition.ground_truth
-    return result_groups(entry, {OVERALL: truth.n_sequences, **truth.counts})
+    return result_table(entry, {OVERALL: truth.n_sequences, **truth.counts})
 
 
-def method_result(result: Result) -> dict[str, Any]:
-    """Return the result of a method on a split for its page."""
-    entry = result.entry
+def method_result(result: Result, pairs: Sequence[Pair]) -> dict[str, Any]:
+    """Return the result of a method on a split for its page; `pairs` are with `result.rivals`."""
+    entry, gaps = result.entry, [gap_of(pair) for pair in pairs]
+    gap = next((each for each in gaps if result.best and each.other.id == result.best.id), None)
+    values = [attempt.value for attempt in reversed(result.attempts) if attempt.value is not None]
     return {
         "result": result,
-        "groups": edition_groups(entry, result.edition),
+        "table": edition_table(entry, result.edition),
+        "card": score_card(entry, result.rows, n_ranked=result.n_ranked, gap=gap),
+        "gaps": gaps,
+        "rank_words": "" if entry.is_visible_to_all else "Rank if public",
+        "history": whiskers.sparkline(values) if len(values) > 1 else "",
         "rank_range": rank_range(entry),
         "errors": result.edition.rules.metrics,
         "attempts": [
@@ -85,7 +99,6 @@ def method_result(result: Result) -> dict[str, Any]:
             for attempt in result.attempts
         ],
         "selection": sentences.selection({entry.method: len(result.attempts)}) if rank_range(entry) else "",
-        "profile": profile_chart.profile((entry, *result.neighbours)),
         "compare_href": _compare_href(result),
         "can_compare": entry.value is not None,
     }

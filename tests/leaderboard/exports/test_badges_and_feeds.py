@@ -171,7 +171,7 @@ def test_links_to_boards_and_methods_show_what_they_are(methods: list[Method], c
     for address, title in (
         ("/board/test/", "Test"),
         ("/board/test/charts/", "Charts of Test"),
-        ("/board/test/editions/", "Test, editions"),
+        ("/board/test/editions/", "Editions of Test"),
         (f"/methods/{first.pk}/", first.name),
         (f"/compare/?m={first.pk}&m={second.pk}", "Comparison on test"),
     ):

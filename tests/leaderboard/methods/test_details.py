@@ -159,7 +159,13 @@ def test_page_takes_the_details_and_shows_them(client: Client, method: Method, o
     assert client.post(address, sent).status_code == 302
     client.logout()
     shown = pages.page(client.get(f"/methods/{method.pk}/")).one("main").text
-    for words in ("Latency (ms)41.5", "31,000,000", "one camera", "provided", "ImageNet-1k"):
+    for words in (
+        "41.5 ms latency",
+        "31,000,000 parameters",
+        "one camera",
+        "provided",
+        "pretrained on ImageNet-1k",
+    ):
         assert words in shown
     client.force_login(owner)
     response = client.post(address, {**sent, "n_parameters": "25 apples", "latency_ms": "fast"})

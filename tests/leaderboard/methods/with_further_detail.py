@@ -36,7 +36,7 @@ def test_the_form_asks_for_it_and_the_method_page_shows_it(
     )
     assert client.post(address, {"mascot": "Larks' own"}).status_code == 302
     client.logout()
-    assert "MascotLarks' own" in pages.page(client.get(f"/methods/{method.pk}/")).one("main").text
+    assert "Mascot: Larks' own" in pages.page(client.get(f"/methods/{method.pk}/")).one("main").text
 
 
 def test_programs_read_it_and_change_it(client: Client, method: Method, owner: User) -> None:

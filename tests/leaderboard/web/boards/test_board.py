@@ -1,12 +1,16 @@
 """The board's page."""
 
+import re
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 from django.test import Client
 from django.urls import reverse
+from django.utils import timezone
+from django.utils.dateparse import parse_datetime
 
-from leaderboard.models import Edition, PublishedResult, User
+from leaderboard.models import Edition, PublishedResult, Split, User
 from tests import builders, pages
 from tests.pages import get
 
@@ -66,7 +70,7 @@ def test_heads_are_plain_links_that_turn_round(client: Client, benchmark: None) 
 
 def test_open_split_without_submissions_says_how_to_be_the_first(client: Client, edition: Edition) -> None:
     notice = get(client).one("p", class_="notice")
-    assert "test has no submissions yet" in notice.text
+    assert "no submissions to Test yet" in notice.text
     assert notice.one("a").attributes["href"] == "/submit/?split=test"
 
 
@@ -74,7 +78,35 @@ def test_board_without_any_row_has_no_empty_table(client: Client, benchmark: Non
     PublishedResult.objects.filter(split="test").delete()
     root = get(client)
     assert root.all("table") == []
-    assert "not open yet" in root.one("main").text
+    assert "Not open for submissions yet" in root.one("main").text
+
+
+def test_closed_board_lists_what_is_open_once(client: Client, edition: Edition, tmp_path: Path) -> None:
+    builders.import_truth(tmp_path, split="demo", seed=1)
+    facts = get(client, "/board/val/").one("p", class_="facts")
+    assert facts.one("span", class_="badge").text == "Not open for submissions yet"
+    assert "open for submissions: Test, Demo" in facts.text
+    Split.objects.filter(pk="test").update(closes_at=datetime(2026, 1, 31, tzinfo=UTC))
+    assert get(client).one("span", class_="badge").text == "Closed for submissions since 2026-01-31"
+    assert get(client).all("p", class_="notice") == []
+
+
+def test_anonymous_row_changes_the_time_of_the_board_by_its_day(
+    client: Client, edition: Edition, owner: User
+) -> None:
+    assert re.search(r"updated [0-9-]{10} [0-9:]{5} UTC", get(client).one("p", class_="facts").text)
+    builders.submit(owner, builders.predictions(edition), visibility="ANONYMOUS")
+    builders.score_all()
+    assert re.search(r"updated [0-9-]{10}( |$)(?!.*UTC)", get(client).one("p", class_="facts").text)
+    updated = parse_datetime(client.get("/api/v1/splits/test/board").json()["updated_at"])
+    assert updated is not None
+    assert updated.date() == timezone.now().date()
+    assert updated >= timezone.now(), "the end of the day, so that it rises"
+
+
+def test_caption_of_the_progress_holds_for_any_filter(client: Client, benchmark: None) -> None:
+    section = get(client, "/board/test/?q=shi").one("section", class_="board-progress")
+    assert "All public submissions to Test" in section.text
 
 
 def test_demo_says_that_its_truth_is_simulated(client: Client, tmp_path: Path, benchmark: None) -> None:

@@ -185,7 +185,7 @@ def test_withdrawn_entry_leaves_its_mark_in_a_former_edition(
     assert row.one("div", class_="name").text == f"M1.05 withdrawn {withdrawn_at:%Y-%m-%d}"
     assert {cell.text for cell in row.all("td")} - {""} == {"–"}
     notices = [each.text for each in root.all("p", class_="notice")]
-    assert "1 row was withdrawn by its team and has no values any more." in notices
+    assert "1 row was withdrawn by its team: the scores are removed from all editions." in notices
 
 
 def test_every_page_that_stays_has_its_own_canonical_address(client: Client, replaced: Edition) -> None:

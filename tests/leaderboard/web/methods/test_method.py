@@ -1,5 +1,6 @@
 """A method's page."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from django.test import Client
 
 from leaderboard.models import Edition, Method, User, Visibility
 from tests import builders, pages
+from tests.leaderboard.web.boards.test_board import row_of
 
 pytestmark = pytest.mark.slow
 
@@ -16,7 +18,7 @@ def method(edition: Edition, owner: User) -> Method:
     builders.submit(
         owner,
         builders.predictions(edition, factor=1.2),
-        description="First line.\n\nSecond <b>line</b>.",
+        description="First line.\n\nSecond <b>line</b>, `tsttc check`.\n\n```\ntsttc score\n```",
         paper_url="https://example.org/paper",
     )
     builders.submit(owner, builders.predictions(edition, factor=1.05))
@@ -34,7 +36,11 @@ def test_it_says_what_it_is_and_where_to_read_more(client: Client, method: Metho
     assert "Owls" in main.text
     assert [p.text for p in main.one("div", class_="description").all("p")] == [
         "First line.",
-        "Second <b>line</b>.",
+        "Second <b>line</b>, tsttc check.",
+    ]
+    assert [code.text for code in main.one("div", class_="description").all("code")] == [
+        "tsttc check",
+        "tsttc score",
     ]
     assert main.one("a", href="https://example.org/paper").attributes["rel"] == "nofollow ugc"
 
@@ -44,13 +50,15 @@ def test_its_values_are_those_of_the_board(client: Client, method: Method) -> No
         row for row in pages.board_rows(pages.page(client.get("/board/test/"))) if row[1].startswith("Foo")
     ]
     main = get(client, method).one("main")
-    values = [
-        cell.text.removesuffix(" best").removesuffix(" second")
-        for half in main.one("div", class_="result").all("table")
-        for cell in half.one("tbody").all("tr")[0].all("td")
+    by_range = [
+        [cell.text.removesuffix(" best").removesuffix(" second") for cell in each.all("td", class_="score")]
+        for each in main.one("div", class_="result").one("tbody").all("tr")
     ]
-    assert values == row[2:]
-    assert f"rank {row[0]} of 6" in main.one("h2").text
+    mids, rtes = zip(*by_range, strict=True)
+    assert [*mids, *rtes] == row[2:]
+    card = main.one("dl", class_="score-card").text
+    assert row[2] in card
+    assert f"Rank{row[0]} of 6" in card
 
 
 def test_each_split_stands_in_its_own_section(
@@ -83,3 +91,58 @@ def test_private_method_is_marked_for_its_team(
     for member in (owner, teammate):
         client.force_login(member)
         assert "only your team sees this page" in get(client, method).one("main").text
+
+
+def test_details_are_chips_and_a_row_of_the_board_shows_the_first_of_them(
+    client: Client, method: Method
+) -> None:
+    Method.objects.update(n_frames=2, uses_nerf=False, latency_ms=5.7, hardware="one GPU")
+    builders.board_changed("test")
+    chips = [chip.text for chip in get(client, method).one("ul", class_="tags").all("li")]
+    assert chips == ["2 frames", "no NeRF", "5.7 ms latency", "one GPU"]
+    row = row_of(pages.get(client, "/board/test/"), "Foo")
+    assert [tag.text for tag in row.all("span", class_="detail")] == ["2 frames"]
+
+
+def test_head_says_the_score_its_lead_and_the_way_there(client: Client, method: Method) -> None:
+    main = get(client, method).one("main")
+    best, own = (
+        float(row_of(pages.get(client, "/board/test/"), name).all("td", class_="primary")[0].text.split()[0])
+        for name in ("Deep Scale", "Foo")
+    )
+    card = main.one("dl", class_="score-card")
+    assert f"Ahead of the next−{best - own:.1f}Deep Scale, {best}" in card.text
+    assert "2 submissions over time" in card.text
+    assert len(card.all("svg", class_="sparkline")) == 1
+    strip = main.one("figure", class_="all-values")
+    assert strip.one("span", class_="spoken").text == "MiD of all methods: 0 lower, 5 not."
+    assert len(strip.one("svg", class_="strip").all("line", class_="own")) == 1
+
+
+def test_nearby_ranks_are_those_that_they_would_be_beside_a_private_method(
+    client: Client, method: Method, owner: User
+) -> None:
+    Method.objects.update(visibility=Visibility.PRIVATE)
+    builders.board_changed("test")
+    client.force_login(owner)
+    main = get(client, method).one("main")
+    assert "Rank if public1 of 6" in main.one("dl", class_="score-card").text
+    rows = main.one("table", class_="gaps").one("tbody").all("tr")
+    ranks = [(row.all("td")[0].text, row.one("th").text) for row in rows]
+    assert ranks == [("2", "Deep Scale"), ("3", "Deep Scale (NeRF)")]
+    assert all("not tested: A row quoted from a paper" in row.text for row in rows)
+
+
+def test_nearby_differences_have_their_intervals_once_a_worker_has_computed_them(
+    client: Client, benchmark: None, tmp_path: Path, owner: User, stranger: User
+) -> None:
+    edition = builders.import_truth(tmp_path, n=600, n_recordings=50)
+    builders.submit(owner, builders.predictions(edition, factor=1.02))
+    builders.submit(stranger, builders.predictions(edition, factor=1.04), method="Bar")
+    builders.score_all()
+    address = f"/methods/{Method.objects.get(name='Foo').pk}/"
+    gaps = [pages.get(client, address).one("table", class_="gaps").text]
+    builders.infer_all()
+    gaps.append(pages.get(client, address).one("table", class_="gaps").text)
+    assert ["computing…" in text for text in gaps] == [True, False]
+    assert re.search(r"Bar[0-9.]+−[0-9.]+−[0-9.]+ to −[0-9.]+", gaps[1])

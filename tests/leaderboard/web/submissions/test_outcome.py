@@ -1,5 +1,7 @@
 """What a submission's page says beyond the numbers: rank, comparison, a row for a paper, its cost."""
 
+import re
+
 import pytest
 from django.db import connection
 from django.test import Client
@@ -27,8 +29,8 @@ def look(client: Client, submission: Submission) -> pages.Element:
     return pages.page(client.get(PAGE.format(submission.pk)))
 
 
-def rank_sentence(root: pages.Element) -> str:
-    return root.one("p", class_="standing").text
+def card(root: pages.Element) -> str:
+    return root.one("dl", class_="score-card").text
 
 
 def beside(root: pages.Element) -> list[list[str]]:
@@ -52,9 +54,7 @@ def test_rank_is_the_boards_with_its_range(signed_in: Client, inferred: list[Sub
     n_ranked = sum(row.rank is not None for row in board_now().entries)
     ends = {interval.rank_low, interval.rank_high}
     within = "–".join(str(end) for end in sorted(end for end in ends if end is not None))
-    assert rank_sentence(look(signed_in, inferred[1])).startswith(
-        f"Rank {row.rank} ({within}) of {n_ranked} on test. In brackets: 95 % confidence range of the rank."
-    )
+    assert f"Rank{row.rank} of {n_ranked}95% range ({within})" in card(look(signed_in, inferred[1]))
 
 
 def test_maintainer_reads_the_same_rank_of_a_private_one(
@@ -62,7 +62,7 @@ def test_maintainer_reads_the_same_rank_of_a_private_one(
 ) -> None:
     sent = builders.submit(owner, builders.predictions(edition, factor=1.01), visibility="PRIVATE")
     builders.score_all()
-    assert "If published: rank 1 of" in rank_sentence(look(keeper, sent))
+    assert "Rank if public1 of" in card(look(keeper, sent))
 
 
 @pytest.mark.parametrize("visibility", ["PUBLIC", "PRIVATE"])
@@ -74,8 +74,10 @@ def test_what_another_submission_of_the_method_surpasses_has_no_rank(
         for factor in (1.2, 1.1)
     )
     builders.score_all()
-    assert rank_sentence(look(signed_in, worse)).startswith("Not the best: the board shows another")
-    assert "rank" in rank_sentence(look(signed_in, better)).lower()
+    root = look(signed_in, worse)
+    assert "Not the best: the board shows another" in root.one("main").text
+    assert "Rank" not in card(root)
+    assert "Rank" in card(look(signed_in, better))
 
 
 def test_what_may_be_the_best_is_marked_as_on_the_board(
@@ -148,10 +150,23 @@ def test_nothing_of_another_team_and_nothing_withdrawn_is_beside_it(
 
 
 def test_latex_row_is_that_of_the_boards_table(signed_in: Client, inferred: list[Submission]) -> None:
-    row = look(signed_in, inferred[1]).one("div", class_="copyable").one("pre").raw_text
+    row = look(signed_in, inferred[1]).one("code", id="latex-row").raw_text
     board = signed_in.get("/board/test.tex").content.decode()
     assert row in board.splitlines()
     assert " & M1.1 & Owls & " in row
+
+
+def test_score_is_quoted_in_one_line_and_no_interval_breaks(
+    signed_in: Client, inferred: list[Submission]
+) -> None:
+    root = look(signed_in, inferred[1])
+    quoted = root.one("code", id="citation").text
+    assert re.fullmatch(r"MiD ([0-9.]+) \[[0-9.]+, [0-9.]+\], rank \d( \(\d–\d\))?, test, edition 1", quoted)
+    cells = root.one("div", class_="result").all("td", class_="span")
+    assert all(
+        re.fullmatch(r"[0-9.]+–[0-9.]+", cell.all("span")[0].text) for cell in cells if cell.text != "–"
+    )
+    assert len(root.one("figure", class_="all-values").all("svg")) == 2
 
 
 # --- what a rejected file costs --------------------------------------------------------------------------

@@ -85,7 +85,7 @@ def test_polling_goes_on_from_the_result_to_its_intervals_and_stops_there(
     assert current_step(fragment).endswith("confidence intervals follow")
     outcome = fragment.one("div", id="outcome")
     assert outcome.attributes["hx-swap-oob"] == "innerHTML"
-    assert len(outcome.one("div", class_="result").all("table")) == 2
+    assert len(outcome.one("div", class_="result").one("tbody").all("tr")) == 5
     assert "The confidence intervals are being computed." in outcome.text
     seen = fragment.one("input", name="seen").attributes["value"]
     assert signed_in.get(STATE.format(submission.pk), {"seen": seen}).status_code == 204
@@ -127,18 +127,20 @@ def test_result_has_the_papers_columns_the_counts_and_the_truncations(
 ) -> None:
     builders.score_all()
     root = get(signed_in, PAGE, submission)
-    mid, rte = root.one("div", class_="result").all("table")
-    for half, symbol in ((mid, "MiD"), (rte, "RTE")):
-        heads = [head.all("span")[0].text for head in half.one("thead").all("th")]
-        assert heads == [symbol, "0–3 s", "3–6 s", "6–20 s", "−20–0 s"]
+    table = root.one("div", class_="result").one("table")
+    heads = [head.text for head in table.one("thead").all("th")]
+    assert heads == ["TTC range", "MiD ×10⁻⁴", "RTE %", "sequences"]
     scores = {
         f"{s.metric}-{s.ttc_range}": f"{s.value:.1f}" for s in submission.evaluations.get().scores.all()
     }
-    values, counts = ([cell.text for cell in row.all("td")] for row in mid.one("tbody").all("tr"))
-    names = ("overall", "crucial", "small", "large", "negative")
-    # A value may be followed by its mark.
-    assert [value.split()[0] for value in values] == [scores[f"mid-{i}"] for i in names]
-    assert counts[0] == str(builders.N_SEQUENCES)
+    rows = table.one("tbody").all("tr")
+    names = [row.one("th").text.split()[-1] for row in rows]
+    assert names == ["overall", "crucial", "small", "large", "negative"]
+    for name, row in zip(names, rows, strict=True):
+        # A value may be followed by its mark.
+        values = [cell.text.split()[0] for cell in row.all("td", class_="score")]
+        assert values == [scores[f"mid-{name}"], scores[f"rte-{name}"]]
+    assert rows[0].one("td", class_="count").text == str(builders.N_SEQUENCES)
     assert "truncated" in root.one("main").text
     assert "1 sequence outside all TTC ranges counts only in the overall scores" in root.one("main").text
 
@@ -164,8 +166,8 @@ def test_our_own_failure_is_called_ours(signed_in: Client, submission: Submissio
     root = get(signed_in, PAGE, submission)
     assert "System error" in current_step(root)
     assert "error on our side" in root.one("main").text
-    assert "You do not need to submit it again" in root.one("main").text
-    assert "your quota is not used" in root.one("main").text
+    assert "you don’t need to submit it again" in root.one("main").text
+    assert "it does not count against your quota" in root.one("main").text
 
 
 def test_one_that_waits_far_too_long_says_so_and_that_nothing_is_lost(
@@ -207,4 +209,4 @@ def test_after_the_score_the_next_steps_are_buttons(signed_in: Client, edition: 
     assert [a.text for a in main.one("p", class_="next").all("a")] == ["Publish…", "Signed receipt"]
     assert main.one("code", id="latex-row").text
     copied = {button.attributes["data-copy"] for button in main.all("button", class_="copy")}
-    assert copied == {"latex-row", "digest"}
+    assert copied == {"citation", "latex-row", "digest"}

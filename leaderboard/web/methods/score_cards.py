@@ -1,0 +1,90 @@
+"""The score that ranks an entry, for the head of its page: rank, difference to the best, all others."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from django.utils.safestring import SafeString
+
+from evaluator.metrics.protocol import metric_of
+from evaluator.metrics.registry import Metric
+from evaluator.scoring.results import format_rounded
+from evaluator.tables.sentences import p_cell
+from leaderboard.boards.rows import Entry
+from leaderboard.statistics.comparisons import Pair
+from leaderboard.web.boards import whiskers
+from leaderboard.web.boards.score_columns import NOTHING, interval_words
+from leaderboard.web.boards.tables import rank_range
+from leaderboard.web.formatting import signed
+
+
+class Gap(NamedTuple):
+    """The difference of an entry to another one in the score that ranks: below 0 the entry is better."""
+
+    other: Entry
+    value: str  # of the other
+    text: str
+    interval: str
+    p: str
+    is_significant: bool
+    why_not_tested: str
+    is_waiting: bool
+
+
+class ScoreCard(NamedTuple):
+    entry: Entry
+    metric: Metric
+    value: str
+    interval: str
+    rank_range: str
+    n_ranked: int
+    gap: Gap | None  # to the best of the others
+    strip: SafeString
+    strip_words: str
+
+
+def score_card(entry: Entry, rows: Sequence[Entry], *, n_ranked: int, gap: Gap | None) -> ScoreCard | None:
+    """Make the card of an entry among `rows`, which everybody sees; None without a value."""
+    if entry.value is None:
+        return None
+    others = [row for row in rows if row.method_id != entry.method_id]
+    values = [row.value for row in others if row.value is not None]
+    metric = metric_of(entry.primary)
+    n_better = sum(value < entry.value for value in values)
+    words = f"{metric.symbol} of all methods: {n_better} lower, {len(values) - n_better} not."
+    return ScoreCard(
+        entry=entry,
+        metric=metric,
+        value=format_rounded(entry.value, decimals=entry.decimals),
+        interval=interval_words(entry.interval, decimals=entry.decimals),
+        rank_range=rank_range(entry),
+        n_ranked=n_ranked,
+        gap=gap,
+        strip=whiskers.strip(values, own=entry.value) if len(values) > 1 else NOTHING,
+        strip_words=words,
+    )
+
+
+def gap_of(pair: Pair) -> Gap:
+    """Word the difference of a pair, with its interval where that is known."""
+    entry, other, difference = pair.first, pair.second, pair.difference
+    decimals = max(entry.decimals, other.decimals)
+    known = difference.difference if difference else (entry.value or 0.0) - (other.value or 0.0)
+    ends = (difference.low, difference.high) if difference else (None, None)
+    return Gap(
+        other=other,
+        value=format_rounded(other.value, decimals=other.decimals),
+        text=signed(known, decimals=decimals),
+        interval=" to ".join(signed(end, decimals=decimals) for end in ends if end is not None),
+        p=p_cell(difference.p, difference.p_below) if difference else "",
+        is_significant=bool(difference and difference.is_significant),
+        why_not_tested=pair.withheld,
+        is_waiting=difference is None,
+    )
+
+
+def citation(card: ScoreCard, *, split: str, edition: int | None) -> str:
+    """Word a score as one quotes it: value, interval, rank, and where it is from."""
+    interval = f" [{card.interval.replace(' to ', ', ')}]" if card.interval else ""
+    rank = f", rank {card.entry.rank} {card.rank_range}".rstrip() if card.entry.rank else ""
+    value = f"{card.metric.symbol} {card.value}{card.metric.unit_of_value}"
+    return f"{value}{interval}{rank}, {split}, edition {edition}"
