@@ -65,7 +65,7 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
         "positives. Where the ground truth is hidden, the interval does not say this: 0 may be an end."
     )
     detectable_difference = serializers.SerializerMethodField(
-        help_text="The smallest difference that the test detects with about 80 % power, an estimate; null: "
+        help_text="The smallest difference that the test detects with about 80% power, an estimate; null: "
         "this one is significant, or there are too few units."
     )
     sentence = serializers.SerializerMethodField(

@@ -31,7 +31,7 @@ def test_a_significant_difference_has_both_ends_of_its_interval(
     difference: Difference, amount: str, ends: str
 ) -> None:
     assert sentence_of(difference) == (
-        f"A's MiD is {amount} than B's (95 % confidence interval: {ends}; p = {difference.p:.4f})."
+        f"A's MiD is {amount} than B's (95% confidence interval: {ends}; p = {difference.p:.4f})."
     )
 
 
@@ -40,15 +40,15 @@ def test_a_significant_difference_has_both_ends_of_its_interval(
     [
         (
             Difference(-0.1, -0.2, 0.0, None, 0.001),
-            "0.1 lower than B's (95 % confidence interval: 0.0 to 0.2 lower, rounded outwards; p < 0.001).",
+            "0.1 lower than B's (95% confidence interval: 0.0 to 0.2 lower, rounded outwards; p < 0.001).",
         ),
         (
             Difference(3.6, 0.0, 7.5, None, 0.05),
-            "3.6 higher than B's (95 % confidence interval: 0.0 to 7.5 higher, rounded outwards; p < 0.05).",
+            "3.6 higher than B's (95% confidence interval: 0.0 to 7.5 higher, rounded outwards; p < 0.05).",
         ),
         (
             Difference(13.0, 0.0, 26.0, None, 0.05),
-            "13 higher than B's (95 % confidence interval: 0 to 26 higher, rounded outwards; p < 0.05).",
+            "13 higher than B's (95% confidence interval: 0 to 26 higher, rounded outwards; p < 0.05).",
         ),
     ],
 )
@@ -71,9 +71,9 @@ def test_an_undecided_difference_says_what_the_test_detects(
     difference: Difference, ends: str, detectable: str
 ) -> None:
     text = sentence_of(difference)
-    assert f"(95 % confidence interval: {ends}; p = {difference.p:.4f})." in text
+    assert f"(95% confidence interval: {ends}; p = {difference.p:.4f})." in text
     assert "The difference is not significant." in text
-    assert text.endswith(f" The test detects a difference above {detectable} with about 80 % power.")
+    assert text.endswith(f" The test detects a difference above {detectable} with about 80% power.")
 
 
 def test_the_detectable_difference_is_that_of_80_percent_power() -> None:
@@ -87,7 +87,7 @@ def test_the_detectable_difference_is_that_of_80_percent_power() -> None:
 
 def test_errors_in_percent_differ_by_percentage_points() -> None:
     text = sentence_of(Difference(0.7, -0.2, 1.6, 0.12), name="rte_small")
-    assert text.startswith("A's RTE on small is 0.70 percentage points higher than B's (95 %")
+    assert text.startswith("A's RTE on small is 0.70 percentage points higher than B's (95%")
     assert "detects a difference above 1.29 percentage points with" in text
 
 
@@ -121,7 +121,7 @@ def test_digits_are_no_more_than_are_published() -> None:
 )
 def test_where_p_is_hidden_its_class_is_shown(p_below: float, words: str, is_significant: bool) -> None:
     text = sentence_of(Difference(-2.0, -3.0, -1.0, None, p_below))
-    assert f"(95 % confidence interval: 1.0 to 3.0 lower; {words})." in text
+    assert f"(95% confidence interval: 1.0 to 3.0 lower; {words})." in text
     assert ("The difference is not significant." in text) is not is_significant
 
 
