@@ -16,6 +16,7 @@ from leaderboard.models import Edition, Split
 from leaderboard.web.boards import board_query, edition_tables, export_views, tables
 from leaderboard.web.boards.board_query import BoardQuery, tools
 from leaderboard.web.boards.rank_ladder import rank_ladder
+from leaderboard.web.charts import chart_views
 from leaderboard.web.lookups import split_or_404
 
 
@@ -50,6 +51,8 @@ def render_board(
         ),
         "ladder": rank_ladder(shown.unfiltered, primary=shown.rules.score_names[0]),
         "exports": export_views.offers(shown, edition, query),
+        "profile": None if chart_views.has_progress(shown) else chart_views.profile(shown),
+        "n_profiles": chart_views.N_PROFILES,
         "progress_label": f"{primary} of each method by date, with the lowest {primary} so far.",
         "n_withdrawn": sum(entry.withdrawn_at is not None for entry in shown.unfiltered),
     }

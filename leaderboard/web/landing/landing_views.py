@@ -28,12 +28,13 @@ from leaderboard.web.submissions.forms import offers_for
 def home(request: HttpRequest) -> HttpResponse:
     splits = splits_of(request)
     main = main_split(splits)
+    now = timezone.now()
     context = {
-        "dates": _dates(splits, reader=request.user, now=timezone.now()),
+        "dates": _dates(splits, reader=request.user, now=now),
         "news": latest(splits),
         "board_split": main.pk if main else "",
     }
-    return render(request, "landing/home.html", context | (_leading(main) if main else {}))
+    return render(request, "landing/home.html", context | (_leading(main, now=now) if main else {}))
 
 
 @require_safe
@@ -65,10 +66,10 @@ def _dates(
     ]
 
 
-def _leading(main: Split) -> dict[str, Any]:
+def _leading(main: Split, *, now: datetime) -> dict[str, Any]:
     # Only what everybody sees, for every reader.
     board = snapshots.board(split=main, viewer=AnonymousUser())
-    progress = chart_views.progress(board)
+    progress = chart_views.progress(board, now=now)
     return {
         "board": board,
         "leaders": leaders(board),
@@ -76,4 +77,6 @@ def _leading(main: Split) -> dict[str, Any]:
         "fronts": [row for row in progress.rows if row[-1]],
         "note": progress.note,
         "progress_label": progress.label,
+        "profile": None if progress else chart_views.profile(board),
+        "n_profiles": chart_views.N_PROFILES,
     }
