@@ -201,6 +201,7 @@ class Frame:
     )  # px before the ground, where it is wide and where it is narrow
     top: int = 0  # px more than usual above it
     more: Mapping[str, Any] = field(default_factory=dict)
+    narrow_series: Sequence[Option] = ()  # what differs in each series where it is narrow
 
     def options(self) -> Option:
         """Return the options of one panel, or of two that stack on a narrow screen."""
@@ -219,7 +220,10 @@ class Frame:
         }
         narrow = {"maxWidth": NARROW_PX}
         media: list[Option] = [{"option": self._layout(n_panels, is_narrow=False)}]
-        media.append({"query": narrow, "option": self._layout(n_panels, is_narrow=True)})
+        option = self._layout(n_panels, is_narrow=True)
+        if self.narrow_series:
+            option["series"] = list(self.narrow_series)
+        media.append({"query": narrow, "option": option})
         return {"baseOption": base, "media": media}
 
     def _layout(self, n_panels: int, *, is_narrow: bool) -> Option:
