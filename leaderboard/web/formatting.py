@@ -1,7 +1,7 @@
 """Times and counts on every page."""
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from datetime import UTC, datetime
 
 from django.utils.html import format_html, format_html_join
@@ -9,6 +9,7 @@ from django.utils.safestring import SafeString
 
 from evaluator import format_rounded
 from evaluator.counting import counted
+from leaderboard.boards.rows import ConfidenceInterval
 
 
 def grouped(value: int | None) -> str:
@@ -31,6 +32,27 @@ def signed(value: float, *, decimals: int = 2) -> str:
     if not float(text):
         return text
     return f"{'−' if value < 0 else '+'}{text}"
+
+
+def interval_words(interval: ConfidenceInterval, *, decimals: int = 2) -> str:
+    """Word an interval; empty where it is not known.
+
+    >>> interval_words(ConfidenceInterval(low=13.9, high=14.523)), interval_words(ConfidenceInterval())
+    ('13.90 to 14.52', '')
+    """
+    if interval.low is None or interval.high is None:
+        return ""
+    low, high = (format_rounded(end, decimals=decimals) for end in (interval.low, interval.high))
+    return f"{low} to {high}"
+
+
+def figure_css(texts: Iterable[str]) -> str:
+    """Return the class that gives each figure the width of the widest, so that points align.
+
+    >>> figure_css(["9.36", "13.66"])
+    'figure w5'
+    """
+    return f"figure w{max((len(text) for text in texts), default=0)}"
 
 
 def duration(seconds: float | None) -> str:

@@ -8,7 +8,6 @@ from django.utils.safestring import SafeString
 from evaluator.metrics.protocol import OVERALL, grouped_names, metric_of, range_of, split_name
 from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import ConfidenceInterval, Entry
-from leaderboard.web.boards.score_columns import figure_css, interval_words
 from leaderboard.web.charts.board_charts import decimals_css
 from leaderboard.web.charts.chart_options import (
     Chart,
@@ -22,6 +21,7 @@ from leaderboard.web.charts.chart_options import (
     x_axis,
 )
 from leaderboard.web.charts.chart_series import SERIES_INKS, SERIES_SYMBOLS, Look, marks, strips, whiskers
+from leaderboard.web.formatting import figure_css, interval_words
 
 
 def profile(entries: Sequence[Entry]) -> Chart:

@@ -16,7 +16,7 @@ from evaluator.tables.sentences import p_cell
 from evaluator.units import in_words
 from leaderboard.boards.rows import Entry
 from leaderboard.statistics.comparisons import Compared, Pair
-from leaderboard.web.boards.score_columns import Group, figure_css, score_groups, score_heading
+from leaderboard.web.boards.score_columns import Group, score_groups, score_heading
 from leaderboard.web.charts import profile_chart, svg
 from leaderboard.web.compare.difference_matrix import (
     best_entry,
@@ -24,7 +24,7 @@ from leaderboard.web.compare.difference_matrix import (
     significant_pairs,
     tested_pairs,
 )
-from leaderboard.web.formatting import signed, with_bold_names
+from leaderboard.web.formatting import figure_css, signed, with_bold_names
 
 _NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
 

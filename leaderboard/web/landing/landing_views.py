@@ -77,6 +77,4 @@ def _leading(main: Split, *, now: datetime) -> dict[str, Any]:
         "fronts": [row for row in progress.rows if row[-1]],
         "note": progress.note,
         "progress_label": progress.label,
-        "profile": None if progress else chart_views.profile(board),
-        "n_profiles": chart_views.N_PROFILES,
     }

@@ -104,11 +104,11 @@ def test_a_progress_has_three_dates_and_else_errors_by_range_take_its_place(
         figures = get(client, address).all("figure", class_="chart")
         return [(figure.attributes["data-chart"], bool(figure.all("table"))) for figure in figures]
 
-    assert below("/board/test/") == below("/") == [("profile", True)]
+    assert below("/board/test/") == [("profile", True)]
     assert ("progress", True) not in below("/board/test/charts/")
     assert client.get("/board/test/charts/progress.json").status_code == 404
     spread(entries)
-    assert below("/board/test/") == below("/") == [("progress", False)]
+    assert below("/board/test/") == [("progress", False)]
     # Its data are on another page: without scripts there is no heading over an empty area.
     assert get(client, "/board/test/").all("section", class_="drawn-only")
     assert below("/board/test/charts/")[0] == ("progress", True)
@@ -255,11 +255,35 @@ def test_team_looks_closer_at_what_it_sent_to_an_open_split(
         "scatter",
     ]
     assert all(figure.one("tbody").all("tr") for figure in root.all("figure"))
+    assert "best on the board" not in root.one("main").text, "there is no other row"
     worst = [float(row.all("td")[1].text) for row in root.all("table")[-1].one("tbody").all("tr")]
     assert worst == sorted(worst, reverse=True)
     assert address in client.get(f"/submissions/{open_split.pk}/").content.decode()
     client.force_login(stranger)
     assert client.get(address).status_code == 404
+
+
+def test_errors_by_time_stand_beside_those_of_the_best_public_row(
+    client: Client, open_split: Submission, stranger: User
+) -> None:
+    edition = open_split.evaluations.get().edition
+    for factor, name, shown in ((1.01, "Secret", "PRIVATE"), (1.02, "Best", "PUBLIC")):
+        builders.submit(
+            stranger, builders.predictions(edition, factor=factor), split="val", method=name, visibility=shown
+        )
+    builders.score_all()
+    builders.infer_all()
+    client.force_login(open_split.submitted_by)
+    figure = get(client, f"/submissions/{open_split.pk}/analysis/").one("figure", **{"data-chart": "curve"})
+    heads = [head.text for head in figure.one("thead").all("th")]
+    assert heads[-2:] == ["MiD of Best", "RTE of Best"]
+    best = Submission.objects.get(method__name="Best").evaluations.get().analysis.content["curve"]
+    cells = [row.all("td")[-2].text for row in figure.one("tbody").all("tr")]
+    assert cells == [f"{row['mid']:.2f}" for row in best]
+    grey = [each for each in options_of(figure)["series"] if each["name"] == "Best, best on the board"]
+    assert [y for each in grey if each["yAxisIndex"] == 0 for _, y in each["data"]] == [
+        row["mid"] for row in best
+    ]
 
 
 def test_of_a_large_board_the_front_and_the_lowest_are_drawn_and_the_chart_says_so(
