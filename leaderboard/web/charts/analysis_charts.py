@@ -71,7 +71,7 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric], best: Reference | None 
     if not bins:
         return empty("curve")
     has_intervals = any(_interval(row, metric) for row in bins for metric in errors)
-    name, best_bins = (f"{best[0].method}, best on the board", best[1]) if best else ("", ())
+    name, best_bins = (f"Best row: {best[0].method}", best[1]) if best else ("", ())
     best_of_bin = {(row["low_s"], row["high_s"]): row for row in best_bins}
     drawn = [*best_bins, *bins]
     frame = Frame(

@@ -255,7 +255,7 @@ def test_team_looks_closer_at_what_it_sent_to_an_open_split(
         "scatter",
     ]
     assert all(figure.one("tbody").all("tr") for figure in root.all("figure"))
-    assert "best on the board" not in root.one("main").text, "there is no other row"
+    assert "Best row" not in root.one("main").text, "there is no other row"
     worst = [float(row.all("td")[1].text) for row in root.all("table")[-1].one("tbody").all("tr")]
     assert worst == sorted(worst, reverse=True)
     assert address in client.get(f"/submissions/{open_split.pk}/").content.decode()
@@ -280,7 +280,7 @@ def test_errors_by_time_stand_beside_those_of_the_best_public_row(
     best = Submission.objects.get(method__name="Best").evaluations.get().analysis.content["curve"]
     cells = [row.all("td")[-2].text for row in figure.one("tbody").all("tr")]
     assert cells == [f"{row['mid']:.2f}" for row in best]
-    grey = [each for each in options_of(figure)["series"] if each["name"] == "Best, best on the board"]
+    grey = [each for each in options_of(figure)["series"] if each["name"] == "Best row: Best"]
     assert [y for each in grey if each["yAxisIndex"] == 0 for _, y in each["data"]] == [
         row["mid"] for row in best
     ]
