@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from django.http import Http404, HttpRequest, HttpResponse, JsonResponse
+from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
@@ -54,10 +54,7 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
 def progress_options(request: HttpRequest, split: str) -> HttpResponse:
     """Answer a split's progress as ECharts options, fetched once the chart comes into view."""
     board = snapshots.board(split=split_or_404(request, split), viewer=request.user)
-    chart = progress(board, now=timezone.now())
-    if not chart:
-        raise Http404(f"The results on {split} have fewer than {board_charts.MIN_DATES} dates.")
-    return JsonResponse(chart.options)
+    return JsonResponse(progress(board, now=timezone.now()).options)
 
 
 def progress(board: Board, *, now: datetime) -> Chart:

@@ -66,4 +66,6 @@ def test_page_tells_what_is_new_and_what_has_moved(months: list[Method], client:
     Submission.objects.update(submitted_at=timezone.now())
     Method.objects.update(shown_at=timezone.now())
     builders.board_changed("test")
-    assert pages.get(client).one("table", class_="board").one("tbody").all("span", class_="new") == [], "of most rows it says nothing"
+    assert pages.get(client).one("table", class_="board").one("tbody").all("span", class_="new") == [], (
+        "of most rows it says nothing"
+    )
