@@ -35,6 +35,7 @@
   // What options ask for with `call`; each gets what it is about, and its chart.
   const CALLS = {
     name: () => (mark) => mark.data.name,
+    text: () => (mark) => mark.data.text,
     number: () => (value) => String(value).replace("-", "−"),
     texts: (places) => (value) => places.find(([place]) => Math.abs(place - value) < 1e-6)?.[1] ?? "",
     // A name begins below its mark. It moves to the left where it would cross the next step or leave the drawing,
@@ -50,6 +51,10 @@
       const high = api.coord([api.value(0), api.value(2)])[1];
       const line = (x1, y1, x2, y2) => ({ type: "line", shape: { x1, y1, x2, y2 }, style: { stroke: ink, lineWidth: 1.5 } });
       return { type: "group", children: [line(x, low, x, high), line(x - 3, low, x + 3, low), line(x - 3, high, x + 3, high)] };
+    },
+    strip: (ink) => ({ coordSys }, api) => {
+      const [left, right] = [0, 1].map((end) => api.coord([api.value(end), api.value(2)])[0]);
+      return { type: "rect", shape: { x: left, y: coordSys.y, width: right - left, height: coordSys.height }, style: { fill: ink } };
     },
     // Drawn once, through all of its points.
     band: (ink) => (place, api) => {

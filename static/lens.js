@@ -33,11 +33,16 @@
     for (const { meter, text, points } of curves) {
       if (!points.length) continue;
       const error = errorAt(points, at);
-      meter.value = at ? error / at : 0; // the share of the time that is left
+      meter.value = at ? error / at : 0;
       text.textContent = `${error.toFixed(2)} s, ${((error * Number(speed.value)) / 3.6).toFixed(1)} m`;
     }
   }
 
+  // One scale for all: the largest share of the time that is left, up to whole 5 %.
+  const shares = curves.flatMap(({ points }) => points.map(([middle, seconds]) => seconds / middle));
+  const full = Math.min(1, Math.ceil(20 * Math.max(...shares)) / 20);
+  for (const { meter } of curves) meter.max = full;
+  document.getElementById("lens-full").textContent = `${Math.round(100 * full)}%`;
   slider.addEventListener("input", draw);
   speed.addEventListener("change", draw);
   for (const part of lens.querySelectorAll("[hidden]")) part.hidden = false;

@@ -14,6 +14,9 @@ SIGNIFICANT: Final = 0.05
 P_CLASSES: Final = (0.001, 0.01, SIGNIFICANT)
 """Below which of these a p lies is told where the p itself is not."""
 
+LEAST_P: Final = 0.0001
+"""The smallest p that the test can give: one in all of its sign flips, and the data itself."""
+
 MIN_DEGREES: Final = 8.0
 """With fewer degrees of freedom nothing is said of a mean: too few units to know how much they vary."""
 

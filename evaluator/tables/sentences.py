@@ -8,7 +8,7 @@ from typing import Final
 
 from evaluator.counting import counted
 from evaluator.metrics.protocol import column_words, metric_of
-from evaluator.scoring.significance import SIGNIFICANT, Difference, best_of, too_few_units
+from evaluator.scoring.significance import LEAST_P, SIGNIFICANT, Difference, best_of, too_few_units
 from evaluator.units import in_words
 
 _DECIMALS_IN_WORDS: Final = {1: "one decimal", 2: "two decimals"}
@@ -17,12 +17,12 @@ _DECIMALS_IN_WORDS: Final = {1: "one decimal", 2: "two decimals"}
 def p_text(p: float | None, below: float | None = None) -> str:
     """Format a p-value with four decimals, or as the class `below` if p is withheld.
 
-    >>> p_text(0.0496), p_text(0.3), p_text(1.0)
-    ('p = 0.0496', 'p = 0.3000', 'p = 1')
+    >>> p_text(0.0496), p_text(0.3), p_text(1.0), p_text(0.0001)
+    ('p = 0.0496', 'p = 0.3000', 'p = 1', 'p ≤ 0.0001')
     >>> p_text(None, 0.01), p_text(None, 1.0)
     ('p < 0.01', 'p ≥ 0.05')
     """
-    if p is None:
+    if p is None or p <= LEAST_P:
         return f"p {p_cell(p, below) or f'≥ {SIGNIFICANT:g}'}"
     return "p = 1" if p == 1 else f"p = {p:.4f}"
 
@@ -32,9 +32,11 @@ def p_cell(p: float | None, below: float | None) -> str:
 
     >>> p_cell(0.0496, 0.05), p_cell(1.0, 1.0), p_cell(None, 0.01), p_cell(None, 1.0), p_cell(None, None)
     ('0.0496', '1.0000', '< 0.01', '≥ 0.05', '')
+    >>> p_cell(0.0001, 0.001)  # the test gives no smaller one
+    '≤ 0.0001'
     """
     if p is not None:
-        return f"{p:.4f}"
+        return f"≤ {LEAST_P:g}" if p <= LEAST_P else f"{p:.4f}"
     if below is None:
         return ""
     return f"< {below:g}" if below <= SIGNIFICANT else f"≥ {SIGNIFICANT:g}"
@@ -191,9 +193,9 @@ def others(differences: Mapping[str, Difference], *, primary: str) -> str:
 
     >>> alike, far = Difference(0.1, -0.2, 0.4, 0.5), Difference(-4.1, -5.3, -2.9, 0.0003)
     >>> others({"mid": far, "mid_small": alike, "rte": alike}, primary="mid")
-    'None of the 2 other metrics differs significantly (α = 0.05, uncorrected).'
+    'None of the 2 other metrics differs significantly (p < 0.05, uncorrected).'
     >>> others({"mid": alike, "mid_small": far, "rte": alike}, primary="mid")
-    '1 of the 2 other metrics differs significantly (α = 0.05, uncorrected).'
+    '1 of the 2 other metrics differs significantly (p < 0.05, uncorrected).'
     """
     tested = [name for name, gap in differences.items() if name != primary and gap.p_below is not None]
     if not tested:
@@ -202,5 +204,5 @@ def others(differences: Mapping[str, Difference], *, primary: str) -> str:
     differ = "differs" if n_different <= 1 else "differ"
     return (
         f"{n_different or 'None'} of the {len(tested)} other metrics {differ} significantly "
-        f"(α = {SIGNIFICANT:g}, uncorrected)."
+        f"(p < {SIGNIFICANT:g}, uncorrected)."
     )

@@ -16,7 +16,9 @@ import evaluator
 from evaluator.metrics.protocol import Protocol
 from evaluator.scoring import uncertainty
 from evaluator.scoring.breakdown import CURVE_EDGES_S
-from leaderboard.models import Analysis, Edition, Evaluation, Split, Status, Submission, User
+from leaderboard.boards import snapshots
+from leaderboard.boards.rows import Entry
+from leaderboard.models import Analysis, Edition, Evaluation, Method, Split, Status, Submission, User
 from leaderboard.sandbox import file_values
 from leaderboard.storage import hidden_marks, truth_values
 
@@ -48,6 +50,24 @@ def curves(*, edition: Edition, evaluations: Collection[UUID]) -> dict[UUID, lis
         return {}
     rows = Analysis.objects.filter(evaluation__edition=edition, evaluation__in=evaluations)
     return dict(rows.values_list("evaluation_id", "content__curve"))
+
+
+def best_curve(*, split: Split, besides: Method) -> tuple[Entry, list[dict[str, Any]]] | None:
+    """Return the best public row of an open board but for one method, and its curve; None if not known."""
+    board = snapshots.board(split=split, viewer=AnonymousUser())
+    if board.edition is None:
+        return None
+    board.edition.split = board.split  # it is at hand
+    ranked = [
+        entry
+        for entry in board.entries
+        if entry.evaluation_id and entry.rank and entry.method_id != besides.pk
+    ]
+    best = min(ranked, key=lambda entry: entry.rank or 0, default=None)
+    if best is None or best.evaluation_id is None:
+        return None
+    curve = curves(edition=board.edition, evaluations=[best.evaluation_id]).get(best.evaluation_id)
+    return (best, curve) if curve else None
 
 
 # --- a worker's work -------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """Times and counts on every page."""
 
 import re
+from collections.abc import Collection, Iterable
 from datetime import UTC, datetime
 
 from django.utils.html import format_html, format_html_join
@@ -8,6 +9,7 @@ from django.utils.safestring import SafeString
 
 from evaluator import format_rounded
 from evaluator.counting import counted
+from leaderboard.boards.rows import ConfidenceInterval
 
 
 def grouped(value: int | None) -> str:
@@ -30,6 +32,27 @@ def signed(value: float, *, decimals: int = 2) -> str:
     if not float(text):
         return text
     return f"{'−' if value < 0 else '+'}{text}"
+
+
+def interval_words(interval: ConfidenceInterval, *, decimals: int = 2) -> str:
+    """Word an interval; empty where it is not known.
+
+    >>> interval_words(ConfidenceInterval(low=13.9, high=14.523)), interval_words(ConfidenceInterval())
+    ('13.90 to 14.52', '')
+    """
+    if interval.low is None or interval.high is None:
+        return ""
+    low, high = (format_rounded(end, decimals=decimals) for end in (interval.low, interval.high))
+    return f"{low} to {high}"
+
+
+def figure_css(texts: Iterable[str]) -> str:
+    """Return the class that gives each figure the width of the widest, so that points align.
+
+    >>> figure_css(["9.36", "13.66"])
+    'figure w5'
+    """
+    return f"figure w{max((len(text) for text in texts), default=0)}"
 
 
 def duration(seconds: float | None) -> str:
@@ -73,6 +96,18 @@ def _paragraph(text: str) -> SafeString:
         return format_html("<pre><code>{}</code></pre>", text[3:-3].strip())
     lines = ((ticked(line),) for line in text.split("\n"))
     return format_html("<p>{}</p>", format_html_join(SafeString("<br>"), "{}", lines))
+
+
+def with_bold_names(sentence: str, names: Collection[str]) -> SafeString:
+    """Set the names of methods off in a sentence, which their commas would break.
+
+    >>> with_bold_names("A, fast is 4 lower than B. <", ["B", "A", "A, fast"])
+    '<b>A, fast</b> is 4 lower than <b>B</b>. &lt;'
+    """
+    choices = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
+    parts = re.split(rf"(?<!\w)({choices})(?!\w)", sentence)
+    pieces = (part if i % 2 == 0 else format_html("<b>{}</b>", part) for i, part in enumerate(parts))
+    return format_html_join("", "{}", ((piece,) for piece in pieces))
 
 
 def breakable(path: str) -> SafeString:

@@ -35,8 +35,9 @@ methods = board_rows.fill(Split.objects.get(pk="demo").current_edition, n={N_SHO
 Method.objects.filter(pk=methods[0].pk).update(name="A" * 80)
 own = Method.objects.filter(pk=methods[1].pk)
 own.update(name="B" * 80, visibility="PRIVATE", team=teams.team_of(user=user))
-earlier = Submission.objects.filter(method__in=methods[::2])
-earlier.update(submitted_at=timezone.now() - timedelta(days=40))
+for rest, days in ((0, 40), (1, 20)):
+    earlier = Submission.objects.filter(method__in=methods[rest::3])
+    earlier.update(submitted_at=timezone.now() - timedelta(days=days))
 with transaction.atomic():
     board_versions.bump("demo")
 """
@@ -63,7 +64,7 @@ def truth(site: Site) -> evaluator.GroundTruth:
 
 @pytest.fixture(scope="session")
 def board(site: Site) -> None:
-    """Rows of `demo` on two dates, two with names of 80 letters and no break, one of these private."""
+    """Rows of `demo` on three dates, two with names of 80 letters and no break, one of these private."""
     open_split(site, "demo")
     site.manage("shell", "-v0", "-c", FILL)
 

@@ -18,6 +18,7 @@ from leaderboard.quotas import admissions
 from leaderboard.web.boards import board_query, edition_tables, export_views, tables
 from leaderboard.web.boards.board_query import BoardQuery, tools
 from leaderboard.web.boards.rank_ladder import rank_ladder
+from leaderboard.web.charts import chart_views
 from leaderboard.web.lookups import split_or_404
 
 
@@ -56,6 +57,8 @@ def render_board(
         "open_splits": []
         if shown.is_open
         else [each for each in splits_of(request) if admissions.is_open(each, now=now)],
+        "profile": None if chart_views.has_progress(shown) else chart_views.profile(shown),
+        "n_profiles": chart_views.N_PROFILES,
         "progress_label": f"{primary} of each method by date, with the lowest {primary} so far.",
         "n_withdrawn": sum(entry.withdrawn_at is not None for entry in shown.unfiltered),
     }

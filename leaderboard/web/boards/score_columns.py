@@ -21,6 +21,7 @@ from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.web.boards import whiskers
 from leaderboard.web.boards.board_query import BoardQuery
 from leaderboard.web.boards.whiskers import WhiskerScale
+from leaderboard.web.formatting import interval_words
 
 SCORED_DECIMALS: Final = 2
 NOTHING: Final = SafeString("")
@@ -162,27 +163,6 @@ def score_cells(
             )
         )
     return tuple(cells)
-
-
-def interval_words(interval: ConfidenceInterval, *, decimals: int = SCORED_DECIMALS) -> str:
-    """Word an interval; empty where it is not known.
-
-    >>> interval_words(ConfidenceInterval(low=13.9, high=14.523)), interval_words(ConfidenceInterval())
-    ('13.90 to 14.52', '')
-    """
-    if interval.low is None or interval.high is None:
-        return ""
-    low, high = (format_rounded(end, decimals=decimals) for end in (interval.low, interval.high))
-    return f"{low} to {high}"
-
-
-def figure_css(texts: Iterable[str]) -> str:
-    """Return the class that gives each figure the width of the widest, so that points align.
-
-    >>> figure_css(["9.36", "13.66"])
-    'figure w5'
-    """
-    return f"figure w{max((len(text) for text in texts), default=0)}"
 
 
 def column_css(name: str, *, primary: str) -> str:

@@ -7,6 +7,7 @@ from typing import Any, Final
 from evaluator.counting import counted
 from evaluator.metrics.registry import Metric
 from evaluator.scoring.results import format_rounded
+from leaderboard.boards.rows import Entry
 from leaderboard.models import Analysis
 from leaderboard.web.charts.chart_options import (
     Chart,
@@ -34,9 +35,11 @@ _TTC_AXIS: Final = {
 }
 MEAN, SPAN = "Mean error", "95% confidence interval"
 Row = Mapping[str, Any]
+Reference = tuple[Entry, Sequence[Row]]
 
 
-def error_analysis_tables(closer: Analysis) -> dict[str, Any]:
+def error_analysis_tables(closer: Analysis, best: Reference | None) -> dict[str, Any]:
+    """Return the charts and tables of an analysis; `best` is a row of the board to compare with."""
     content, distribution = closer.content, closer.content["distribution"]
     rules = closer.evaluation.edition.rules
     errors = [metric for metric in rules.metrics if metric.name in distribution]
@@ -44,7 +47,7 @@ def error_analysis_tables(closer: Analysis) -> dict[str, Any]:
     return {
         "n_sequences": counted(content["n_sequences"], "sequence"),
         "n_recordings": counted(content["n_recordings"], "recording"),
-        "curve": curve(content["curve"], errors),
+        "curve": curve(content["curve"], errors, best),
         "histogram": histogram(content["histogram"], rules.primary),
         "primary": rules.primary.symbol,
         "errors": errors,
@@ -63,35 +66,59 @@ def error_analysis_tables(closer: Analysis) -> dict[str, Any]:
 # --- error by time to contact ----------------------------------------------------------------------------
 
 
-def curve(bins: Sequence[Row], errors: Sequence[Metric]) -> Chart:
-    """Draw mean errors by true TTC with confidence intervals."""
+def curve(bins: Sequence[Row], errors: Sequence[Metric], best: Reference | None = None) -> Chart:
+    """Draw mean errors by true TTC with confidence intervals, and those of the best row in grey."""
     if not bins:
         return empty("curve")
     has_intervals = any(_interval(row, metric) for row in bins for metric in errors)
+    name, best_bins = (f"Best row: {best[0].method}", best[1]) if best else ("", ())
+    best_of_bin = {(row["low_s"], row["high_s"]): row for row in best_bins}
+    drawn = [*best_bins, *bins]
     frame = Frame(
         x_axes=[x_axis("True time to contact in s", _TTC_AXIS) for _ in errors],
-        y_axes=[error_axis(metric, _ends(bins, metric)) for metric in errors],
+        y_axes=[error_axis(metric, _ends(drawn, metric)) for metric in errors],
         series=[
-            series
-            for i, metric in enumerate(errors)
-            for run in _runs(bins)
-            for series in _curve_series(run, metric, grid=i)
+            *(
+                line(name, [(_middle(row), row[metric.name]) for row in run], "--quiet", grid=i)
+                for i, metric in enumerate(errors)
+                for run in _runs(best_bins)
+            ),
+            *(
+                series
+                for i, metric in enumerate(errors)
+                for run in _runs(bins)
+                for series in _curve_series(run, metric, grid=i)
+            ),
         ],
-        names=[MEAN, SPAN] if has_intervals else [],
+        names=[MEAN, *([SPAN] if has_intervals else []), *([name] if best else [])],
     )
-    columns = ("Time to contact in s", "Sequences", *(metric.heading for metric in errors))
+    best_columns = [f"{metric.symbol} of {best[0].method}" for metric in errors] if best else []
+    columns = ("Time to contact in s", "Sequences", *(metric.heading for metric in errors), *best_columns)
     return Chart(
         kind="curve",
         label=f"Mean {' and '.join(metric.symbol for metric in errors)} by true time to contact.",
         options=frame.options(),
         columns=columns,
         rows=tuple(
-            (_seconds(row), grouped(row["n"]), *(_value_words(row, metric) for metric in errors))
+            (
+                _seconds(row),
+                grouped(row["n"]),
+                *(_value_words(row, metric) for metric in errors),
+                *(_best_words(best_of_bin.get((row["low_s"], row["high_s"])), errors) if best else ()),
+            )
             for row in bins
         ),
         numbers=tuple(range(1, len(columns))),
         has_intervals=has_intervals,
     )
+
+
+def _middle(row: Row) -> float:
+    return float(row["low_s"] + row["high_s"]) / 2
+
+
+def _best_words(row: Row | None, errors: Sequence[Metric]) -> list[str]:
+    return [format_rounded(row[metric.name] if row else None) for metric in errors]
 
 
 def _interval(row: Row, metric: Metric) -> tuple[float, float] | None:
@@ -105,17 +132,18 @@ def _ends(bins: Sequence[Row], metric: Metric) -> list[float]:
 
 def _runs(bins: Sequence[Row]) -> Iterator[list[Row]]:
     # No line crosses a gap without sequences.
-    run = [bins[0]]
+    run = list(bins[:1])
     for before, row in itertools.pairwise(bins):
         if row["low_s"] != before["high_s"]:
             yield run
             run = []
         run.append(row)
-    yield run
+    if run:
+        yield run
 
 
 def _curve_series(run: Sequence[Row], metric: Metric, *, grid: int) -> Iterator[Option]:
-    middles = [(row["low_s"] + row["high_s"]) / 2 for row in run]
+    middles = [_middle(row) for row in run]
     points = [
         Mark(
             middle,

@@ -33,6 +33,8 @@ _ROOM: Final = 0.15
 SUBMITTED, QUOTED = "Submissions", "Published results"
 # Behind a front. More marks are a blot, and a board of ten thousand made a page of 7 MB of them.
 MAX_BEHIND: Final = 500
+# Fewer are no progress: a line straight up.
+MIN_DATES: Final = 3
 
 
 # --- a front and what lies behind it ---------------------------------------------------------------------
@@ -118,12 +120,16 @@ def decimals_css(entry: Entry, most: int) -> str:
 # --- progress over time ----------------------------------------------------------------------------------
 
 
-def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = (), *, metric: Metric) -> Chart:
-    """Draw the ranking score of every submission by day, and published results by year."""
-    by_method = {entry.method_id: entry for entry in entries if entry.method_id is not None}
+_Dated = list[tuple[float, float, Entry, str]]
+
+
+def _dated(entries: Iterable[Entry], attempts: Iterable[Attempt]) -> tuple[_Dated, list[int], list[datetime]]:
+    """Return the points of a progress, the years of its papers, and the days of its submissions."""
+    rows = list(entries)
+    by_method = {entry.method_id: entry for entry in rows if entry.method_id is not None}
     quoted = [
         (entry, value, entry.year)
-        for entry in entries
+        for entry in rows
         if entry.kind == "published" and entry.year and (value := entry.value) is not None
     ]
     sent = [
@@ -131,16 +137,38 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = (), *, metr
         for attempt in attempts
         if attempt.method_id in by_method and (value := attempt.value) is not None
     ]
-    if not quoted and not sent:
-        return empty("progress")
     placed = [
         (_ms(datetime(year, 7, 1, tzinfo=UTC)), value, entry, str(year)) for entry, value, year in quoted
     ]
     placed += [(_ms(day), value, entry, f"{day:%Y-%m-%d}") for entry, value, day in sent]
+    return placed, [year for *_, year in quoted], [day for *_, day in sent]
+
+
+def has_progress(entries: Iterable[Entry], attempts: Iterable[Attempt]) -> bool:
+    """Tell whether there are results of enough dates to draw a progress."""
+    placed, *_ = _dated(entries, attempts)
+    return _n_dates(placed) >= MIN_DATES
+
+
+def _n_dates(placed: _Dated) -> int:
+    return len({x for x, *_ in placed})
+
+
+def progress(
+    entries: Iterable[Entry], attempts: Iterable[Attempt] = (), *, metric: Metric, now: datetime
+) -> Chart:
+    """Draw the ranking score of every submission by day, and published results by year, until today.
+
+    Empty with results of fewer than three dates.
+    """
+    placed, years, days = _dated(entries, attempts)
+    if _n_dates(placed) < MIN_DATES:
+        return empty("progress")
     points, note = _drawn(_with_front(placed), metric)
-    first, last = _time_range([day for *_, day in sent], [year for *_, year in quoted])
+    today = _day(now)
+    first, last = _time_range([*days, today], years)
     series, names = _front_series(
-        points, metric, line="Best so far", praise="the best when it came", end=_ms(last)
+        points, metric, line="Best so far", praise="the best when it came", end=max(_ms(today), points[-1].x)
     )
     frame = Frame(
         x_axes=[x_axis(_time_title(first, last), _time_axis(first, last))],
@@ -233,7 +261,12 @@ def latency(entries: Sequence[Entry], *, metric: Metric) -> Chart:
     """Draw the metric that ranks against latency, with the Pareto front."""
     points, note = _drawn(
         _with_front(
-            (latency_ms, value, entry, f"{latency_ms:g} ms")
+            (
+                latency_ms,
+                value,
+                entry,
+                f"{latency_ms:g} ms on {entry.details['hardware'] or 'unknown hardware'}",
+            )
             for entry in entries
             if entry.is_visible_to_all
             and (latency_ms := entry.details["latency_ms"]) is not None
@@ -243,12 +276,10 @@ def latency(entries: Sequence[Entry], *, metric: Metric) -> Chart:
     )
     if not points:
         return empty("latency")
-    axis = log_axis(each.x for each in points)
-    series, names = _front_series(
-        points, metric, line="Pareto front", praise="on the Pareto front", end=axis["max"]
-    )
+    last = max(each.x for each in points if each.is_front)
+    series, names = _front_series(points, metric, line="Pareto front", praise="on the Pareto front", end=last)
     frame = Frame(
-        x_axes=[x_axis("Latency in ms (log scale)", axis)],
+        x_axes=[x_axis("Latency in ms (log scale)", log_axis(each.x for each in points))],
         y_axes=[error_axis(metric, [each.y for each in points], room=_ROOM)],
         series=series,
         names=names,

@@ -14,6 +14,7 @@ from django.urls import reverse
 from evaluator.metrics.registry import Metric
 from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import Entry
+from leaderboard.web.charts import svg
 
 Option = dict[str, Any]
 
@@ -115,11 +116,16 @@ def log_axis(values: Iterable[float], *, room: float = 0.0) -> Option:
     return {"type": "log", "min": low, "max": high, "axisLabel": ticks, "axisTick": ticks}
 
 
-def error_axis(metric: Metric, values: Iterable[float], *, room: float = 0.0) -> Option:
-    """Make an axis of errors from 0, or logarithmic and labelled so."""
+def error_axis(
+    metric: Metric, values: Iterable[float], *, room: float = 0.0, is_near: bool = False
+) -> Option:
+    """Make an axis of errors from 0, or from near the values, or logarithmic and labelled so."""
     known = list(values) or [1.0]
     name = f"{metric.symbol}, {metric.unit}".rstrip(", ")
     if min(known) <= 0 or max(known) <= _MAX_STRAIGHT * min(known):
+        if is_near:
+            ends = svg.round_ticks(min(known), max(known), n=4)
+            return y_axis(name, {"type": "value", "min": ends[0], "max": ends[-1]})
         return y_axis(name, {"type": "value", "min": 0})
     return y_axis(f"{name} (log scale)", log_axis(known, room=room))
 
@@ -201,6 +207,7 @@ class Frame:
     )  # px before the ground, where it is wide and where it is narrow
     top: int = 0  # px more than usual above it
     more: Mapping[str, Any] = field(default_factory=dict)
+    narrow_series: Sequence[Option] = ()  # what differs in each series where it is narrow
 
     def options(self) -> Option:
         """Return the options of one panel, or of two that stack on a narrow screen."""
@@ -219,7 +226,10 @@ class Frame:
         }
         narrow = {"maxWidth": NARROW_PX}
         media: list[Option] = [{"option": self._layout(n_panels, is_narrow=False)}]
-        media.append({"query": narrow, "option": self._layout(n_panels, is_narrow=True)})
+        option = self._layout(n_panels, is_narrow=True)
+        if self.narrow_series:
+            option["series"] = list(self.narrow_series)
+        media.append({"query": narrow, "option": option})
         return {"baseOption": base, "media": media}
 
     def _layout(self, n_panels: int, *, is_narrow: bool) -> Option:

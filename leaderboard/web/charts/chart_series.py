@@ -103,6 +103,12 @@ def band(name: str, spans: Iterable[tuple[float, float, float]], ink: str, *, gr
     }
 
 
+def strips(names: Iterable[int], y: float, *, grid: int) -> Option:
+    """Draw a light strip behind these names of an axis, over the whole height; `y` is any value within it."""
+    spans = [(i - 0.5, i + 0.5, y) for i in names]
+    return _custom("strip", "", spans, "--tint", grid=grid) | {"encode": {"x": [0, 1], "y": 2}, "z": -1}
+
+
 def _custom(
     function: str, name: str, spans: Iterable[tuple[float, float, float]], ink: str, *, grid: int
 ) -> Option:

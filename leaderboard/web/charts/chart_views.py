@@ -1,12 +1,18 @@
 """The page of a board's charts, and one chart's options for other pages."""
 
+from collections.abc import Sequence
+from datetime import datetime
+
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import render
+from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from evaluator.tables import sentences
 from leaderboard.boards import snapshots
 from leaderboard.boards.listing import Board
+from leaderboard.boards.rows import Entry
+from leaderboard.boards.snapshots import Attempt
 from leaderboard.http_caching import cacheable
 from leaderboard.statistics import comparisons
 from leaderboard.statistics.comparisons import Pair
@@ -27,14 +33,14 @@ def charts(request: HttpRequest, split: str) -> HttpResponse:
 
 
 def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpResponse:
-    shown = [entry for entry in board.entries if entry.is_visible_to_all]
     context = {
         "board": board,
-        "progress": progress(board),
-        "latency": board_charts.latency(shown, metric=board.rules.primary),
-        "profile": profile_chart.profile(shown[:N_PROFILES]),
+        "progress": progress(board, now=timezone.now()),
+        "latency": board_charts.latency(_public(board), metric=board.rules.primary),
+        "profile": profile(board),
         "n_profiles": N_PROFILES,
         "significance": significance_chart.significance(pairs, split=board.split.pk),
+        "is_computing": any(pair.differences is None for pair in pairs),
         "n_first": comparisons.N_FIRST,
         "resolution": sentences.resolution(
             [pair.differences or {} for pair in comparisons.neighbours(pairs)],
@@ -48,10 +54,28 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
 def progress_options(request: HttpRequest, split: str) -> HttpResponse:
     """Answer a split's progress as ECharts options, fetched once the chart comes into view."""
     board = snapshots.board(split=split_or_404(request, split), viewer=request.user)
-    return JsonResponse(progress(board).options)
+    return JsonResponse(progress(board, now=timezone.now()).options)
 
 
-def progress(board: Board) -> Chart:
-    shown = [entry for entry in board.entries if entry.is_visible_to_all]
-    attempts = snapshots.shown(split=board.split, edition=board.edition).attempts if board.edition else ()
-    return board_charts.progress(shown, attempts, metric=board.rules.primary)
+def progress(board: Board, *, now: datetime) -> Chart:
+    """Draw the progress of a board; empty with results of fewer than three dates."""
+    return board_charts.progress(_public(board), _attempts(board), metric=board.rules.primary, now=now)
+
+
+def has_progress(board: Board) -> bool:
+    return board_charts.has_progress(_public(board), _attempts(board))
+
+
+def profile(board: Board) -> Chart:
+    """Draw the errors by TTC range of the first public rows of a board."""
+    return profile_chart.profile(_public(board)[:N_PROFILES])
+
+
+def _public(board: Board) -> list[Entry]:
+    # Whatever the reader has filtered or sorted.
+    shown = (entry for entry in board.unfiltered if entry.is_visible_to_all)
+    return sorted(shown, key=lambda entry: (entry.rank is None, entry.rank, entry.method.casefold()))
+
+
+def _attempts(board: Board) -> Sequence[Attempt]:
+    return snapshots.shown(split=board.split, edition=board.edition).attempts if board.edition else ()

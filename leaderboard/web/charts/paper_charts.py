@@ -58,7 +58,7 @@ def sweep(shown: PrintedTable) -> Chart:
     )
     frame = Frame(
         x_axes=[x_axis(shown.headings[shown.n_names - 1], setting_axis) for _ in metrics],
-        y_axes=[error_axis(metric, _values(table, metric)) for metric in metrics],
+        y_axes=[error_axis(metric, _values(table, metric), is_near=True) for metric in metrics],
         series=[
             series
             for legend, name, of_method in lines

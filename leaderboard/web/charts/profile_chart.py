@@ -8,8 +8,6 @@ from django.utils.safestring import SafeString
 from evaluator.metrics.protocol import OVERALL, grouped_names, metric_of, range_of, split_name
 from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import ConfidenceInterval, Entry
-from leaderboard.web.boards.score_columns import figure_css, interval_words
-from leaderboard.web.boards.tables import rank_range
 from leaderboard.web.charts.board_charts import decimals_css
 from leaderboard.web.charts.chart_options import (
     Chart,
@@ -22,24 +20,31 @@ from leaderboard.web.charts.chart_options import (
     names_axis,
     x_axis,
 )
-from leaderboard.web.charts.chart_series import SERIES_INKS, SERIES_SYMBOLS, Look, marks, whiskers
+from leaderboard.web.charts.chart_series import SERIES_INKS, SERIES_SYMBOLS, Look, marks, strips, whiskers
+from leaderboard.web.formatting import figure_css, interval_words
 
 
 def profile(entries: Sequence[Entry]) -> Chart:
     shown = [entry for entry in entries if entry.value is not None][: len(SERIES_INKS)]
     if not shown:
         return empty("profile")
-    panels = grouped_names(shown[0].scores)
+    panels, legend = grouped_names(shown[0].scores), _legend_names(shown)
     frame = Frame(
         x_axes=[x_axis("", names_axis([_range_words(name) for name in names])) for names in panels.values()],
         y_axes=[error_axis(metric, _all_ends(shown, names)) for metric, names in panels.items()],
         series=[
-            series
-            for k, entry in enumerate(shown)
-            for i, names in enumerate(panels.values())
-            for series in _profile_series(k, entry, names, n_methods=len(shown), grid=i)
+            *(
+                strips(range(0, len(names), 2), max(_all_ends(shown, names), default=1.0), grid=i)
+                for i, names in enumerate(panels.values())
+            ),
+            *(
+                series
+                for k, entry in enumerate(shown)
+                for i, names in enumerate(panels.values())
+                for series in _profile_series(k, entry, names, legend=legend, grid=i)
+            ),
         ],
-        names=[_legend_name(k, entry) for k, entry in enumerate(shown)] if len(shown) > 1 else [],
+        names=legend if len(shown) > 1 else [],
     )
     # As if all had the most decimals: the others keep the room of the missing one.
     most = max(entry.decimals for entry in shown)
@@ -64,10 +69,10 @@ def profile(entries: Sequence[Entry]) -> Chart:
     )
 
 
-def _legend_name(k: int, entry: Entry) -> str:
-    # The position in the chart keeps names apart where there is no rank.
-    rank_text = f"{entry.rank} {rank_range(entry)}".strip() if entry.rank is not None else f"[{k + 1}]"
-    return f"{rank_text}  {entry.method}"
+def _legend_names(shown: Sequence[Entry]) -> list[str]:
+    # A legend needs different names.
+    names = [entry.method for entry in shown]
+    return [name if names.count(name) == 1 else f"{name} [{k + 1}]" for k, name in enumerate(names)]
 
 
 def _all_ends(shown: Sequence[Entry], names: Sequence[str]) -> list[float]:
@@ -82,11 +87,11 @@ def _all_ends(shown: Sequence[Entry], names: Sequence[str]) -> list[float]:
 
 
 def _profile_series(
-    k: int, entry: Entry, names: Sequence[str], *, n_methods: int, grid: int
+    k: int, entry: Entry, names: Sequence[str], *, legend: Sequence[str], grid: int
 ) -> tuple[Option, Option]:
     """Return the marks and whiskers of one method in one panel, moved aside from others."""
-    step = min(0.16, 0.7 / n_methods)
-    offset = step * (k - (n_methods - 1) / 2)
+    step = min(0.16, 0.7 / len(legend))
+    offset = step * (k - (len(legend) - 1) / 2)
     points = [
         (i + offset, value, name) for i, name in enumerate(names) if (value := entry.scores[name]) is not None
     ]
@@ -100,9 +105,8 @@ def _profile_series(
         for interval in [entry.intervals.get(name, ConfidenceInterval())]
         if interval.low is not None and interval.high is not None
     ]
-    legend = _legend_name(k, entry)
-    look = Look(SERIES_INKS[k], SERIES_SYMBOLS[k], 9.0)
-    return marks(legend, profile_marks, look, grid=grid), whiskers(legend, spans, SERIES_INKS[k], grid=grid)
+    name, look = legend[k], Look(SERIES_INKS[k], SERIES_SYMBOLS[k], 9.0)
+    return marks(name, profile_marks, look, grid=grid), whiskers(name, spans, SERIES_INKS[k], grid=grid)
 
 
 def _range_words(name: str) -> str:

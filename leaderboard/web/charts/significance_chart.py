@@ -12,18 +12,20 @@ from evaluator.metrics.protocol import metric_of
 from evaluator.metrics.registry import Metric
 from evaluator.tables.sentences import p_cell
 from leaderboard.boards.rows import Entry
+from leaderboard.models import Visibility
 from leaderboard.statistics.comparisons import Pair
-from leaderboard.web.charts.chart_options import Chart, Frame, Mark, Option, empty, ranks_axis
+from leaderboard.web.charts.chart_options import Chart, Frame, Mark, Option, call, empty, ranks_axis
 from leaderboard.web.charts.chart_series import cells
 from leaderboard.web.formatting import signed
 
-_FEW: Final = 8
+_FEW, _FEW_ON_A_PHONE = 8, 5
 SIGNIFICANT: Final = {0.001: "p < 0.001", 0.01: "p < 0.01", 0.05: "p < 0.05"}
-UNDECIDED, UNKNOWN = "not significant", "not compared"
+UNDECIDED, COMPUTING = "not significant", "computing…"
+ANONYMOUS, UNTESTED = "no test (anonymous)", "no test"
 _INKS: Final = dict(
     zip(
-        (*SIGNIFICANT.values(), UNDECIDED, UNKNOWN),
-        ("--heat1", "--heat2", "--heat3", "--hair", "--tint"),
+        (*SIGNIFICANT.values(), UNDECIDED, ANONYMOUS, UNTESTED, COMPUTING),
+        ("--heat1", "--heat2", "--heat3", "--hair", "--tint", "--tint", "--doubt-tint"),
         strict=True,
     )
 )
@@ -49,17 +51,21 @@ class _Cell:
     @property
     def verdict(self) -> str:
         """Return the class of its p-value, or why there is none."""
-        if self.difference is None or self.difference.p_below is None:
-            return UNKNOWN
+        if self.difference is None:
+            return COMPUTING
+        if self.difference.p_below is None:
+            shown = (self.pair.first.visibility, self.pair.second.visibility)
+            return ANONYMOUS if Visibility.ANONYMOUS in shown else UNTESTED
         return SIGNIFICANT.get(self.difference.p_below, UNDECIDED)
 
     def texts(self) -> tuple[str, str, str]:
+        """Return difference, interval and p."""
         if self.difference is None:
-            return "being computed", "", ""
+            return COMPUTING, "", ""
         decimals = self.pair.first.decimals
         difference = signed(self.difference.difference, decimals=decimals)
         if self.difference.low is None or self.difference.high is None:
-            return difference, "", "not compared"
+            return difference, "", UNTESTED
         ends = (signed(end, decimals=decimals) for end in (self.difference.low, self.difference.high))
         return difference, " to ".join(ends), p_cell(self.difference.p, self.difference.p_below)
 
@@ -67,8 +73,8 @@ class _Cell:
         difference, interval, p = self.texts()
         first, second = self.pair.first, self.pair.second
         words = f"{self.metric.symbol} {difference}" + (f" ({interval})" if interval else "")
-        read = [f"{_named(first)} against {_named(second)}", words]
-        read += [self.verdict if not p or self.verdict == UNKNOWN else f"p {p}: {self.verdict}"]
+        read = [f"{_named(first)} vs. {_named(second)}", words]
+        read += [f"p {p}: {self.verdict}"] if interval else [self.pair.withheld or self.verdict]
         query = urlencode({"split": self.split, "m": [first.method_id, second.method_id]}, doseq=True)
         return Mark(self.column, self.row, tuple(read), f"{reverse('compare')}?{query}")
 
@@ -87,6 +93,7 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
         x_axes=[ranks_axis([str(entry.rank) for entry in entries[1:]], name="Rank of the other method")],
         y_axes=[ranks_axis([_named(entry) for entry in entries[:-1]], is_upright=True)],
         series=[_series(name, [cell for cell in pair_cells if cell.verdict == name]) for name in verdicts],
+        narrow_series=[{"label": {"show": len(entries) <= _FEW_ON_A_PHONE}} for _ in verdicts],
         names=verdicts,
         left=(220, 120),
         top=30,
@@ -95,7 +102,7 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
         kind="significance",
         label=f"Pairs of the first {len(entries)} methods by the p-value of their difference in {symbol}.",
         options=frame.options(),
-        columns=("Method", "Compared with", f"Difference in {symbol}", "95 % confidence interval", "p"),
+        columns=("Method", "vs.", f"Difference in {symbol}", "95% confidence interval", "p"),
         rows=tuple((_named(cell.pair.first), _named(cell.pair.second), *cell.texts()) for cell in pair_cells),
         numbers=(2, 4),
         is_low=len(entries) <= _FEW,
@@ -103,7 +110,11 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
 
 
 def _series(name: str, pair_cells: Sequence[_Cell]) -> Option:
-    return cells(name, [cell.mark() for cell in pair_cells], _INKS[name])
+    series = cells(name, [cell.mark() for cell in pair_cells], _INKS[name])
+    for item, cell in zip(series["data"], pair_cells, strict=True):
+        item["text"] = "" if cell.difference is None else cell.texts()[0]
+    ink = "--ground" if name == SIGNIFICANT[0.001] else "--ink"
+    return series | {"label": {"show": True, "color": ink, "fontSize": 11, "formatter": call("text")}}
 
 
 def _entries(pairs: Sequence[Pair]) -> list[Entry]:

@@ -1,6 +1,5 @@
 """Tables of comparisons: the verdict in words, the values, the differences of each pair."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 from uuid import UUID
@@ -11,29 +10,40 @@ from django.utils.text import get_text_list
 from evaluator import Difference
 from evaluator.metrics.protocol import grouped_names, metric_of
 from evaluator.scoring.results import format_rounded
-from evaluator.scoring.significance import significant_together, too_few_units
+from evaluator.scoring.significance import too_few_units
 from evaluator.tables import sentences
 from evaluator.tables.sentences import p_cell
 from evaluator.units import in_words
 from leaderboard.boards.rows import Entry
 from leaderboard.statistics.comparisons import Compared, Pair
-from leaderboard.web.boards.score_columns import Group, figure_css, score_groups, score_heading
+from leaderboard.web.boards.score_columns import Group, score_groups, score_heading
 from leaderboard.web.charts import profile_chart, svg
-from leaderboard.web.formatting import signed
+from leaderboard.web.compare.difference_matrix import (
+    best_entry,
+    difference_matrix,
+    significant_pairs,
+    tested_pairs,
+)
+from leaderboard.web.formatting import figure_css, signed, with_bold_names
 
 _NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
 
 
 def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, Any]:
     """Return a comparison for the page; `n_tried` are scored submissions by method."""
+    names = [entry.method for entry in compared.entries]
+    chosen = sentences.selection(
+        {each.method: n_tried.get(each.method_id, 0) for each in compared.entries if each.method_id}
+    )
     return {
         "compared": compared,
-        "verdict": verdict(compared),
+        "title": f"{_NUMBERS.get(len(names), 'Two').capitalize()} methods compared",
+        "verdict": with_bold_names(verdict(compared), names),
+        "matrix": difference_matrix(compared),
+        "metric": metric_of(compared.entries[0].primary),
         "pairs": [_pair_table(pair) for pair in compared.pairs],
         "profile": profile_chart.profile(compared.entries),
-        "selection": sentences.selection(
-            {each.method: n_tried.get(each.method_id, 0) for each in compared.entries if each.method_id}
-        ),
+        "selection": with_bold_names(chosen, names),
     }
 
 
@@ -43,9 +53,9 @@ def verdict(compared: Compared) -> str:
         return ""
     if len(compared.entries) == len(("first", "second")):
         return compared.pairs[0].sentence()
-    best = min(compared.entries, key=lambda entry: entry.value or 0.0)
-    tested = [pair for pair in compared.pairs if not pair.withheld and pair.difference is not None]
-    worse, alike = _worse_and_alike(best, tested)
+    best = best_entry(compared.entries)
+    tested = tested_pairs(compared)
+    worse, alike = _worse_and_alike(best, tested, significant_pairs(compared))
     head = (
         f"Of these {_NUMBERS[len(compared.entries)]}, {best.method} has the lowest "
         f"{metric_of(best.primary).symbol}, "
@@ -61,34 +71,29 @@ def verdict(compared: Compared) -> str:
     return " ".join([*lines, *dict.fromkeys(pair.withheld for pair in compared.pairs if pair.withheld)])
 
 
-def _worse_and_alike(best: Entry, tested: Sequence[Pair]) -> tuple[list[str], list[str]]:
-    """Return the methods that the best is significantly better than, and the others.
+def _worse_and_alike(
+    best: Entry, tested: Sequence[Pair], significant: Sequence[Pair]
+) -> tuple[list[str], list[str]]:
+    """Return the methods that the best is significantly better than, and the others."""
+    of_best = [pair for pair in tested if best in (pair.first, pair.second)]
+    worse = [pair for pair in of_best if pair in significant]
+    alike = [pair for pair in of_best if pair not in significant]
+    return _rivals(best, worse), _rivals(best, alike)
 
-    The best was chosen from the data, so all pairs are tested together. The board's marks and rank ranges
-    outweigh this test.
-    """
-    apart = significant_together([pair.difference for pair in tested if pair.difference])
-    worse: list[str] = []
-    alike: list[str] = []
-    for pair, is_apart in zip(tested, apart, strict=True):
-        if best not in (pair.first, pair.second):
-            continue
-        other = pair.second if pair.first == best else pair.first
-        on_board, of_best = (each.interval for each in (other, best))
-        is_worse = is_apart and not on_board.is_with_best
-        is_worse |= (of_best.rank_high or math.inf) < (on_board.rank_low or 0)
-        (worse if is_worse else alike).append(other.method)
-    return worse, alike
+
+def _rivals(best: Entry, pairs: Sequence[Pair]) -> list[str]:
+    return [(pair.second if pair.first == best else pair.first).method for pair in pairs]
 
 
 def _pair_table(pair: Pair) -> dict[str, Any]:
     differences = pair.differences or {}
     columns = pair.first.scores
+    names = (pair.first.method, pair.second.method)
     return {
         "pair": pair,
-        "sentence": pair.sentence(),
+        "sentence": with_bold_names(pair.sentence(), names),
         "others": pair.others(),
-        "influence": pair.influence(),
+        "influence": with_bold_names(pair.influence(), names),
         "groups": [
             _difference_group(group, [name for name in names if name in differences], pair, differences)
             for group, names in zip(score_groups(columns), grouped_names(columns).values(), strict=True)

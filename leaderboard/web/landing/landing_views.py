@@ -37,7 +37,7 @@ def home(request: HttpRequest) -> HttpResponse:
         "news": latest(splits),
         "board_split": main.pk if main else "",
     }
-    return render(request, "landing/home.html", context | (_leading(main) if main else {}))
+    return render(request, "landing/home.html", context | (_leading(main, now=now) if main else {}))
 
 
 @require_safe
@@ -84,7 +84,7 @@ def _dates(
     ]
 
 
-def _leading(main: Split) -> dict[str, Any]:
+def _leading(main: Split, *, now: datetime) -> dict[str, Any]:
     # Only what everybody sees, for every reader.
     board = snapshots.board(split=main, viewer=AnonymousUser())
     return {
@@ -93,5 +93,5 @@ def _leading(main: Split) -> dict[str, Any]:
         "lead": lead_words(board),
         "range_leaders": range_leaders(board),
         "profile": profile_chart.profile(board.entries[:N_LEADERS]),
-        "progress": chart_views.progress(board),
+        "progress": chart_views.progress(board, now=now),
     }

@@ -12,8 +12,8 @@ from leaderboard.boards.listing import Board
 from leaderboard.boards.rows import Entry
 from leaderboard.exports.tables import team_of
 from leaderboard.statistics import confidence
-from leaderboard.web.boards.score_columns import interval_words
 from leaderboard.web.boards.tables import rank_range
+from leaderboard.web.formatting import interval_words
 
 N_LEADERS: Final = 3
 # So many methods are named; of more, the rest is counted.

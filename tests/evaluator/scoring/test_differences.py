@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evaluator import compare_predictions, confidence_intervals, evaluate
-from evaluator.scoring.differences import rounded_difference, sign_flips
-from evaluator.scoring.significance import Difference
+from evaluator.scoring.differences import N_SIGN_FLIPS, rounded_difference, sign_flips
+from evaluator.scoring.significance import LEAST_P, Difference
 from tests.evaluator.recordings import Floats, permutation_p, predictions, sign_flip_p, world
 
 
@@ -18,6 +18,10 @@ def test_p_is_that_of_scipys_permutation_test() -> None:
         expected = permutation_p(gaps, n_resamples=9_999)
         p = sign_flip_p(gaps[:, None], rng=np.random.default_rng(1))[0]
         assert p == pytest.approx(expected, abs=0.015)
+
+
+def test_smallest_p_is_that_of_no_flip_as_large() -> None:
+    assert LEAST_P == 1 / (N_SIGN_FLIPS + 1)
 
 
 # --- the interval ----------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from evaluator.metrics.registry import MID
 from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import Attempt
 from leaderboard.models import Comparison, Edition, Method, Submission, User
-from leaderboard.web.charts import board_charts
+from leaderboard.web.charts import board_charts, chart_views
 from tests import builders, pages
 from tests.pages import get
 
@@ -29,6 +29,14 @@ def rows(client: Client, chart: str) -> list[list[str]]:
     return [[cell.text for cell in row.all("td")] for row in figure.one("tbody").all("tr")]
 
 
+def spread(entries: list[Submission]) -> None:
+    """Let each entry be of another day: a progress."""
+    for i, entry in enumerate(entries):
+        at = timezone.now() - timedelta(days=3 * i + 3)
+        Submission.objects.filter(pk=entry.pk).update(submitted_at=at)
+    builders.board_changed("test")
+
+
 def options_of(figure: pages.Element) -> Any:
     """Return the options that the script draws, as ECharts takes them."""
     return json.loads(figure.one("script").raw_text)["baseOption"]
@@ -37,12 +45,14 @@ def options_of(figure: pages.Element) -> Any:
 def test_every_chart_has_its_options_and_the_table_with_the_same_numbers(
     client: Client, entries: list[Submission]
 ) -> None:
+    Method.objects.update(latency_ms=3.5, hardware="one GPU")
+    spread(entries)
     builders.infer_all()
     root = get(client, "/board/test/charts/")
     assert [figure.attributes["data-chart"] for figure in root.all("figure")] == [
         "progress",
-        "latency",
         "profile",
+        "latency",
         "significance",
     ]
     for figure in root.all("figure"):
@@ -81,9 +91,46 @@ def test_no_option_is_finer_than_the_values_of_the_edition(
 
 
 def test_the_options_of_the_progress_are_those_of_the_page(client: Client, entries: list[Submission]) -> None:
+    spread(entries)
     figure = get(client, "/board/test/charts/").one("figure", **{"data-chart": "progress"})
     assert client.get("/board/test/charts/progress.json").json()["baseOption"] == options_of(figure)
     assert client.get("/board/nowhere/charts/progress.json").status_code == 404
+
+
+def test_a_progress_has_three_dates_and_else_errors_by_range_are_drawn(
+    client: Client, entries: list[Submission]
+) -> None:
+    def below(address: str) -> list[tuple[str, bool]]:
+        figures = get(client, address).all("figure", class_="chart")
+        return [(figure.attributes["data-chart"], bool(figure.all("table"))) for figure in figures]
+
+    assert below("/board/test/") == [("profile", True)]
+    assert ("progress", True) not in below("/board/test/charts/")
+    assert client.get("/board/test/charts/progress.json").json() == {}
+    spread(entries)
+    assert below("/board/test/") == [("progress", False)]
+    # Its data are on another page: without scripts there is no heading over an empty area.
+    assert get(client, "/board/test/").all("section", class_="drawn-only")
+    assert below("/board/test/charts/")[0] == ("progress", True)
+
+
+def test_below_a_board_the_chart_does_not_change_with_its_filters(
+    client: Client, entries: list[Submission]
+) -> None:
+    charts = [
+        get(client, address).one("figure").one("script").raw_text
+        for address in ("/board/test/", "/board/test/?q=M1.05&sort=-mid")
+    ]
+    assert charts[0] == charts[1]
+
+
+def test_the_lowest_so_far_is_drawn_until_today(edition: Edition, entries: list[Submission]) -> None:
+    spread(entries)
+    now = timezone.now() + timedelta(days=90)
+    chart = chart_views.progress(snapshots.board(split=edition.split, viewer=AnonymousUser()), now=now)
+    base = chart.options["baseOption"]
+    today_ms = now.replace(hour=0, minute=0, second=0, microsecond=0).timestamp() * 1000
+    assert base["series"][0]["data"][-1][0] == today_ms <= base["xAxis"][0]["max"]
 
 
 def test_the_front_is_what_nothing_beats_in_both(client: Client, entries: list[Submission]) -> None:
@@ -125,9 +172,27 @@ def compared(entries: list[Submission], edition: Edition) -> list[Submission]:
     return entries
 
 
+def pairs_figure(client: Client) -> pages.Element:
+    return get(client, "/board/test/charts/").one("figure", **{"data-chart": "significance"})
+
+
+def test_what_is_being_computed_is_no_missing_test_and_comes_by_itself(
+    client: Client, compared: list[Submission]
+) -> None:
+    (series,) = options_of(pairs_figure(client))["series"]
+    assert series["name"] == "computing…"
+    assert (
+        get(client, "/board/test/charts/").one("section", id="pairs").attributes["hx-trigger"] == "every 3s"
+    )
+    builders.infer_all()
+    assert "hx-trigger" not in get(client, "/board/test/charts/").one("section", id="pairs").attributes
+    cells = [mark for series in options_of(pairs_figure(client))["series"] for mark in series["data"]]
+    assert all(cell["text"].startswith("−") for cell in cells), "the row is better"
+
+
 def test_first_rows_are_compared_once_the_page_is_read(client: Client, compared: list[Submission]) -> None:
     assert Comparison.objects.count() == 0
-    assert {row[2] for row in rows(client, "significance")} == {"being computed"}
+    assert {row[2] for row in rows(client, "significance")} == {"computing…"}
     n_pairs = len(compared) * (len(compared) - 1) // 2
     assert Comparison.objects.filter(computed_at=None).count() == n_pairs
     builders.infer_all()
@@ -159,7 +224,9 @@ def test_pairs_that_are_withheld_show_their_published_difference_alone(
     builders.infer_all()
     hidden = [row for row in rows(client, "significance") if "Anonymous" in f"{row[0]} {row[1]}"]
     assert len(hidden) == len(compared)
-    assert {(row[3], row[4]) for row in hidden} == {("", "not compared")}
+    assert {(row[3], row[4]) for row in hidden} == {("", "no test")}
+    series = {each["name"]: each for each in options_of(pairs_figure(client))["series"]}
+    assert len(series["no test (anonymous)"]["data"]) == len(compared)
 
 
 # --- the closer look -------------------------------------------------------------------------------------
@@ -188,11 +255,35 @@ def test_team_looks_closer_at_what_it_sent_to_an_open_split(
         "scatter",
     ]
     assert all(figure.one("tbody").all("tr") for figure in root.all("figure"))
+    assert "Best row" not in root.one("main").text, "there is no other row"
     worst = [float(row.all("td")[1].text) for row in root.all("table")[-1].one("tbody").all("tr")]
     assert worst == sorted(worst, reverse=True)
     assert address in client.get(f"/submissions/{open_split.pk}/").content.decode()
     client.force_login(stranger)
     assert client.get(address).status_code == 404
+
+
+def test_errors_by_time_stand_beside_those_of_the_best_public_row(
+    client: Client, open_split: Submission, stranger: User
+) -> None:
+    edition = open_split.evaluations.get().edition
+    for factor, name, shown in ((1.01, "Secret", "PRIVATE"), (1.02, "Best", "PUBLIC")):
+        builders.submit(
+            stranger, builders.predictions(edition, factor=factor), split="val", method=name, visibility=shown
+        )
+    builders.score_all()
+    builders.infer_all()
+    client.force_login(open_split.submitted_by)
+    figure = get(client, f"/submissions/{open_split.pk}/analysis/").one("figure", **{"data-chart": "curve"})
+    heads = [head.text for head in figure.one("thead").all("th")]
+    assert heads[-2:] == ["MiD of Best", "RTE of Best"]
+    best = Submission.objects.get(method__name="Best").evaluations.get().analysis.content["curve"]
+    cells = [row.all("td")[-2].text for row in figure.one("tbody").all("tr")]
+    assert cells == [f"{row['mid']:.2f}" for row in best]
+    grey = [each for each in options_of(figure)["series"] if each["name"] == "Best row: Best"]
+    assert [y for each in grey if each["yAxisIndex"] == 0 for _, y in each["data"]] == [
+        row["mid"] for row in best
+    ]
 
 
 def test_of_a_large_board_the_front_and_the_lowest_are_drawn_and_the_chart_says_so(
@@ -205,10 +296,10 @@ def test_of_a_large_board_the_front_and_the_lowest_are_drawn_and_the_chart_says_
         Attempt(first.method_id, uuid4(), began + timedelta(days=day), {"mid": mid})
         for day, mid in enumerate((60.0, 90.0, 80.0, 50.0, 70.0))
     ]
-    whole = board_charts.progress([first], attempts, metric=MID)
+    whole = board_charts.progress([first], attempts, metric=MID, now=began)
     assert (len(whole.rows), whole.note) == (5, "")
     monkeypatch.setattr(board_charts, "MAX_BEHIND", 2)
-    chart = board_charts.progress([first], attempts, metric=MID)
+    chart = board_charts.progress([first], attempts, metric=MID, now=began)
     assert [float(row[3].partition(">")[2].partition("<")[0]) for row in chart.rows] == [60, 80, 50, 70]
     assert chart.note == "Shown are the 4 with the lowest MiD, or on the line, of 5."
     assert sum(len(each["data"]) for each in chart.options["baseOption"]["series"][1:]) >= 4

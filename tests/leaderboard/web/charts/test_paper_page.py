@@ -46,6 +46,8 @@ def test_sweeps_have_a_chart_with_every_number_of_their_table() -> None:
     assert sorted(drawn) == sorted(value for row in rows for value in row.values)
     lines = [mark["read"] for each in gap if each["type"] == "scatter" for mark in each["data"]]
     assert ["MiD 41.0", "the paper's default"] in lines
+    for axis in charts["ablation-kernel-size"].options["baseOption"]["yAxis"]:
+        assert axis["max"] < 2 * axis["min"], "from near the values: from 0 the lines are level"
 
 
 def test_tables_are_downloaded_and_the_api_has_their_numbers(client: Client) -> None:

@@ -58,13 +58,15 @@ def test_verdict_comes_first_then_every_difference_with_interval_and_p(
         first, second, difference = (float(cell.text.replace("−", "-")) for cell in row.all("td")[:3])
         assert difference == pytest.approx(first - second, abs=0.011)
         *_, interval, p = (cell.text for cell in row.all("td"))
-        assert p == "too few recordings" or (" to " in interval and 0 < float(p) <= 1)
+        assert p == "too few recordings" or (" to " in interval and 0 < float(p.removeprefix("≤ ")) <= 1)
     series = json.loads(root.one("figure").one("script").raw_text)["baseOption"]["series"]
     assert len(series) >= 2
     assert len(root.one("figure").one("tbody").all("tr")) == 10
 
 
-def test_five_methods_are_ten_pairs_and_one_verdict(client: Client, edition: Edition, owner: User) -> None:
+def test_five_methods_are_one_verdict_a_matrix_and_ten_closed_pairs(
+    client: Client, edition: Edition, owner: User
+) -> None:
     sent = [
         builders.submit(owner, builders.predictions(edition, factor=1.05 + i / 5), method=f"M{i}")
         for i in range(5)
@@ -77,6 +79,27 @@ def test_five_methods_are_ten_pairs_and_one_verdict(client: Client, edition: Edi
     assert len(root.all("section", class_="pair")) == 10
     assert root.one("p", class_="verdict").text.startswith("Of these five, M0 has the lowest MiD, ")
     assert all(len(pair.all("p", class_="others")) == 1 for pair in root.all("section", class_="pair"))
+    assert all("open" not in each.attributes for each in root.one("div", id="comparison").all("details"))
+    matrix = [
+        [cell.text for cell in row.all("td")[1:]] for row in root.one("table", class_="matrix").all("tr")[1:]
+    ]
+    assert [row[i] for i, row in enumerate(matrix)] == [""] * 5
+    assert matrix[0][1].startswith("−")
+    assert matrix[0][1].endswith("*, significantly better")
+    assert matrix[1][0] == matrix[0][1].replace("−", "+").replace("better", "worse")
+    forest = root.one("table", class_="forest").one("tbody").all("tr")
+    assert [row.one("th").text for row in forest] == ["M1", "M2", "M3", "M4"]
+    assert [row.all("td")[0].text for row in forest] == [row[0].partition("*")[0] for row in matrix[1:]]
+    assert forest[0].all("td")[-1].text == "≤ 0.0001", "the smallest p that the test can give"
+
+
+def test_a_difference_without_a_test_has_no_star(client: Client, entries: list[Submission]) -> None:
+    Split.objects.filter(pk="test").update(is_hidden=True)  # of one team: not tested on hidden labels
+    ids = [entry.method_id for entry in entries[:3]]
+    root = get(client, *ids)
+    cells = [cell.text for cell in root.one("table", class_="matrix").all("td") if "," in cell.text]
+    assert [cell.rpartition(", ")[2] for cell in cells] == ["no test"] * 6
+    assert root.all("table", class_="forest") == []
 
 
 def test_every_bad_question_has_a_page_that_says_what_is_wrong(

@@ -1,0 +1,147 @@
+"""Three to five methods at a glance: the difference of every pair, and of all to the best on one scale."""
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
+
+from django.utils.safestring import SafeString
+
+from evaluator import Difference
+from evaluator.scoring.significance import significant_together
+from evaluator.tables.sentences import p_cell
+from leaderboard.boards.rows import Entry
+from leaderboard.statistics.comparisons import Compared, Pair
+from leaderboard.web.charts import svg
+from leaderboard.web.formatting import signed
+
+
+class MatrixCell(NamedTuple):
+    """The row's value minus the column's; all is empty on the diagonal."""
+
+    text: str = ""
+    css: str = ""  # better or worse where significant
+    hint: str = ""
+
+
+class ForestRow(NamedTuple):
+    """The difference of one method to the best, with its interval drawn."""
+
+    entry: Entry
+    difference: str
+    drawing: SafeString
+    interval: str
+    p: str
+    is_significant: bool
+
+
+class Matrix(NamedTuple):
+    """Methods from the best to the worst, the cells of each, and the forest plot of all against the best."""
+
+    rows: tuple[tuple[Entry, tuple[MatrixCell, ...]], ...]
+    forest: tuple[ForestRow, ...]
+    axis: SafeString
+    n_tested: int
+
+    @property
+    def best(self) -> Entry:
+        return self.rows[0][0]
+
+
+def best_entry(entries: Sequence[Entry]) -> Entry:
+    """Return the entry with the lowest score that ranks."""
+    return min(entries, key=lambda entry: entry.value or 0.0)
+
+
+def tested_pairs(compared: Compared) -> list[Pair]:
+    """Return the pairs that have a p-value or its class, or would have with more recordings."""
+    return [pair for pair in compared.pairs if not pair.withheld and pair.difference is not None]
+
+
+def significant_pairs(compared: Compared) -> list[Pair]:
+    """Return the pairs that differ significantly, all of them tested together.
+
+    The best is chosen from the data, so no pair is tested alone. The board's marks and rank ranges outweigh
+    the test.
+    """
+    best, tested = best_entry(compared.entries), tested_pairs(compared)
+    apart = significant_together([pair.difference for pair in tested if pair.difference])
+    return [
+        pair for pair, is_apart in zip(tested, apart, strict=True) if _is_significant(pair, is_apart, best)
+    ]
+
+
+def _is_significant(pair: Pair, is_apart: bool, best: Entry) -> bool:
+    better, worse = sorted((pair.first, pair.second), key=lambda entry: entry.value or 0.0)
+    if (better.interval.rank_high or math.inf) < (worse.interval.rank_low or 0):
+        return True
+    return is_apart and not (best is better and worse.interval.is_with_best)
+
+
+def difference_matrix(compared: Compared) -> Matrix | None:
+    """Return the matrix of a complete comparison of three methods or more, by the score that ranks."""
+    if len(compared.entries) < 3 or not compared.is_complete:
+        return None
+    entries = sorted(compared.entries, key=lambda entry: entry.value or 0.0)
+    differences: dict[tuple[str, str], Difference] = {}
+    for pair in compared.pairs:
+        if pair.difference is not None:
+            differences[pair.first.id, pair.second.id] = pair.difference
+            differences[pair.second.id, pair.first.id] = pair.difference.turned()
+    significant = {frozenset((pair.first.id, pair.second.id)) for pair in significant_pairs(compared)}
+    rows = tuple(
+        (row, tuple(_cell(row, column, differences, significant) for column in entries)) for row in entries
+    )
+    n_tested = sum(each.p_below is not None for each in differences.values()) // 2
+    return Matrix(rows, *_forest(entries, differences, significant), n_tested)
+
+
+def _cell(
+    row: Entry,
+    column: Entry,
+    differences: Mapping[tuple[str, str], Difference],
+    significant: Collection[frozenset[str]],
+) -> MatrixCell:
+    difference = differences.get((row.id, column.id))
+    if difference is None:
+        return MatrixCell()
+    text = signed(difference.difference, decimals=row.decimals)
+    if difference.p_below is None:
+        return MatrixCell(text, hint="no test")
+    if frozenset((row.id, column.id)) not in significant:
+        return MatrixCell(text, hint="not significant")
+    css = "better" if difference.difference < 0 else "worse"
+    return MatrixCell(text, css, f"significantly {css}")
+
+
+def _forest(
+    entries: Sequence[Entry],
+    differences: Mapping[tuple[str, str], Difference],
+    significant: Collection[frozenset[str]],
+) -> tuple[tuple[ForestRow, ...], SafeString]:
+    best, *others = entries
+    to_best = [
+        (entry, difference)
+        for entry in others
+        if (difference := differences.get((entry.id, best.id))) is not None and difference.low is not None
+    ]
+    end = svg.scale_end(
+        value for _, each in to_best for value in (each.low, each.high, each.difference) if value is not None
+    )
+    rows = tuple(
+        ForestRow(
+            entry=entry,
+            difference=signed(each.difference, decimals=entry.decimals),
+            drawing=svg.difference(end, each.difference, each.low, each.high),
+            interval=_interval(each, entry.decimals),
+            p=p_cell(each.p, each.p_below),
+            is_significant=frozenset((entry.id, best.id)) in significant,
+        )
+        for entry, each in to_best
+    )
+    return rows, svg.axis(end)
+
+
+def _interval(difference: Difference, decimals: int) -> str:
+    if difference.low is None or difference.high is None:
+        return ""
+    return f"{signed(difference.low, decimals=decimals)} to {signed(difference.high, decimals=decimals)}"
