@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal
 
-from evaluator.metrics.registry import MID, RTE, Metric
+from evaluator.metrics.registry import MID, RTE, WARNING, Metric
 
 if TYPE_CHECKING:
     import numpy as np
@@ -230,11 +230,12 @@ def registered(*protocols: Protocol) -> dict[str, Protocol]:
 
 PROTOCOLS: Final[dict[str, Protocol]] = registered(
     Protocol(name="tsttc-1", limit_s=20.0, near_zero_s=(-0.15, 0.05)),
+    Protocol(name="tsttc-2", limit_s=20.0, near_zero_s=(-0.15, 0.05), metrics=(MID, RTE, WARNING)),
     Protocol(name="toolkit", limit_s=20.0, near_zero_s=None),
 )
 """Every protocol by its name."""
 
-ProtocolName = Literal["tsttc-1", "toolkit"]
+ProtocolName = Literal["tsttc-1", "tsttc-2", "toolkit"]
 """For a type checker and an editor; `get_protocol` takes every name of `PROTOCOLS`."""
 
 DEFAULT_PROTOCOL: Final = "tsttc-1"

@@ -13,9 +13,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
     from evaluator.metrics.scale import Floats
+
+WARNING_S: Final = 2.7
+"""The time to contact of a forward collision warning, which the paper cites."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +120,26 @@ def _relative_ttc_error(terms: Terms) -> Floats:
     return error
 
 
+def is_warning(ttc_s: Floats, *, threshold_s: float) -> NDArray[np.bool_]:
+    """Whether a collision warning is due at each of these times: 0 < τ ≤ threshold."""
+    return (ttc_s > 0.0) & (ttc_s <= threshold_s)
+
+
+def _warning_error(terms: Terms) -> Floats:
+    """Compute 100 % where one of τ̂ and τ is in (0 s, 2.7 s] and the other is not, else 0; NaN of NaN."""
+    import numpy as np  # noqa: PLC0415 -- as the docstring above says
+
+    warned, due = (
+        is_warning(ttc_s, threshold_s=WARNING_S) for ttc_s in (terms.predicted_ttc_s, terms.true_ttc_s)
+    )
+    error = np.where(warned != due, 100.0, 0.0)
+    error[np.isnan(terms.predicted_ttc_s) | np.isnan(terms.true_ttc_s)] = math.nan
+    return error
+
+
 MID: Final = Metric("mid", "MiD", "×10⁻⁴", "Motion-in-depth error", 2, _motion_in_depth_error)
 RTE: Final = Metric("rte", "RTE", "%", "Relative TTC error", 2, _relative_ttc_error)
+WARNING: Final = Metric("warning", "WE", "%", "Warning error", 2, _warning_error)
 
 
 def rank(values: Sequence[float | None]) -> list[int | None]:

@@ -4,33 +4,41 @@ import dataclasses
 from collections.abc import Collection, Sequence
 from datetime import datetime
 from pathlib import Path
+from typing import Final
 
 from django.db import transaction
 from django.db.models import Max
 
 import evaluator
 from evaluator.counting import counted
-from evaluator.metrics.protocol import OVERALL, PROTOCOLS, get_protocol, known_ranges
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, OVERALL, PROTOCOLS, get_protocol, known_ranges
 from evaluator.predictions.revisions import Comparison, compare
 from evaluator.units import RECORDING, Units
 from leaderboard import audit, board_versions
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, GroundTruth, Publication, Split, TruthComparison, User
+from leaderboard.statistics import disclosure
 from leaderboard.storage import files, manifests, truth_values
+
+OPEN_PROTOCOL: Final = "tsttc-2"
+"""The protocol of an open split's first edition, unless another one is named."""
 
 
 def import_truth(
-    *, split_name: str, path: Path, now: datetime, protocol: str = "tsttc-1", actor: User | None = None
+    *, split_name: str, path: Path, now: datetime, protocol: str | None = None, actor: User | None = None
 ) -> Edition:
     """Validate a split's first ground truth, keep it, and publish edition 1 with it.
 
-    Returns the existing edition for the same ground truth and protocol. Raises `evaluator.Rejected`, or
-    `Refused` if the split is unknown or has other ground truth (a correction is `corrections.open_edition`).
+    By default the protocol is `OPEN_PROTOCOL`, that of a hidden split `DEFAULT_PROTOCOL`. Returns the
+    existing edition for the same ground truth and protocol. Raises `evaluator.Rejected`, `Refused` if the
+    split is unknown or has other ground truth (corrections: `corrections.open_edition`), or as `new_edition`.
     """
-    get_protocol(protocol)
+    if protocol is not None:
+        get_protocol(protocol)
     with transaction.atomic():
         row = add(split_name=split_name, path=path, now=now, actor=actor)
         split = Split.objects.select_for_update(no_key=True).get(pk=split_name)
+        protocol = protocol or (DEFAULT_PROTOCOL if split.is_hidden else OPEN_PROTOCOL)
         existing = Edition.objects.filter(split=split, ground_truth=row, protocol=protocol).first()
         if existing is not None:
             return existing
@@ -171,7 +179,18 @@ def new_edition(
     now: datetime,
     actor: User | None,
 ) -> Edition:
-    """Create the next edition of a split whose row the caller has locked."""
+    """Create the next edition of a split whose row the caller has locked.
+
+    Raises `Refused` for a protocol that would tell too much of hidden values.
+    """
+    allowed = disclosure.hidden_protocols()
+    if split.is_hidden and protocol not in allowed:
+        further = [m.title for m in get_protocol(protocol).metrics if m not in disclosure.HIDDEN_METRICS]
+        raise Refused(
+            "edition-refused",
+            f"The ground truth of the split {split.pk!r} is hidden, and protocol {protocol!r} would tell "
+            f"more of it ({', '.join(further)}) than a submission may; expected one of {', '.join(allowed)}.",
+        )
     units = units_of(row)
     last = split.editions.aggregate(last=Max("number"))["last"] or 0
     edition = Edition.objects.create(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import evaluator
 from evaluator.metrics.protocol import Protocol
+from evaluator.metrics.registry import WARNING, WARNING_S, is_warning
 from evaluator.scoring import uncertainty
 from evaluator.scoring.breakdown import CURVE_EDGES_S
 from leaderboard.boards import snapshots
@@ -29,6 +30,7 @@ QUANTILES = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
 N_BINS = 24
 MAX_POINTS = 500
 MAX_RECORDINGS = 20
+THRESHOLDS_S = (1.0, 1.5, 2.0, 2.5, WARNING_S, 3.0, 3.5, 4.0, 4.5, 5.0)
 
 
 def for_submission(*, submission: Submission, viewer: User | AnonymousUser) -> Analysis | None:
@@ -127,6 +129,10 @@ def content_of(
       the last has `"high": None`;
     - `scatter`: `{"true_s": […], "predicted_s": […]}` of at most 500 random sequences, predictions truncated;
     - `worst`: at most 20 recordings by mean error in it, worst first: `{"recording", "n", "mid", …}`;
+    - `warnings`, if the protocol has the warning error: for each threshold from 1 to 5 s
+      `{"threshold_s", "missed", "false"}`, both `{"n", "share", "interval"}`: of the `n` sequences with a
+      warning due, or without, the share in % without a warning, or with one (None of none), and its 95 %
+      interval `[low, high]` where there are enough units;
     - `n_sequences` and `n_recordings`.
 
     Errors have the names of the protocol's metrics and are rounded as published; times to a millisecond.
@@ -154,6 +160,11 @@ def content_of(
             "predicted_s": np.round(predicted_s, 3).tolist(),
         },
         "worst": _worst(truth, errors, decimals, by=rules.primary.name),
+        **(
+            {"warnings": _warnings(truth, report.details.predicted_ttc_s, decimals, unit)}
+            if WARNING in rules.metrics
+            else {}
+        ),
     }
 
 
@@ -167,10 +178,7 @@ def _curve(
     counts = np.bincount(cells, minlength=shape[0] * shape[1]).reshape(shape).astype(float)
     per_metric = [np.bincount(cells, weights=each, minlength=counts.size) for each in errors.values()]
     sums: Floats = np.stack([each.reshape(shape) for each in per_metric]).astype(float)
-    # The weights of an open split are no secret: these are those of `tsttc score`.
-    units = truth.manifest.units_by(unit)
-    of_units = [uncertainty.by_units(each, units) for each in (counts, sums)]
-    low, high = uncertainty.bootstrap_of(truth.digest, of_units[0]).intervals(of_units[1])
+    low, high = _intervals(truth, counts, sums, unit)
     totals, n = sums.sum(axis=1), counts.sum(axis=0)
     return [
         {
@@ -186,6 +194,52 @@ def _curve(
         }
         for i, (low_s, high_s) in enumerate(itertools.pairwise(CURVE_EDGES_S), 1)
         if n[i]
+    ]
+
+
+def _intervals(
+    truth: evaluator.GroundTruth, counts: Floats, sums: Floats, unit: str | None
+) -> tuple[Floats, Floats]:
+    """Compute the intervals of means by counts (G, columns) and sums (N, G, columns) of recordings."""
+    # The weights of an open split are no secret: these are those of `tsttc score`.
+    units = truth.manifest.units_by(unit)
+    of_units = [uncertainty.by_units(each, units) for each in (counts, sums)]
+    return uncertainty.bootstrap_of(truth.digest, of_units[0]).intervals(of_units[1])
+
+
+def _warnings(
+    truth: evaluator.GroundTruth, predicted_ttc_s: Floats, decimals: int, unit: str | None
+) -> list[dict[str, Any]]:
+    index, n_recordings = truth.manifest.recording_index, truth.manifest.n_recordings
+
+    def by_recording(chosen: list[NDArray[np.bool_]]) -> Floats:
+        columns = [np.bincount(index[rows], minlength=n_recordings) for rows in chosen]
+        return np.stack(columns, axis=1).astype(float)
+
+    of_side, wrong = list[NDArray[np.bool_]](), list[NDArray[np.bool_]]()
+    for threshold_s in THRESHOLDS_S:
+        due, warned = (is_warning(each, threshold_s=threshold_s) for each in (truth.ttc_s, predicted_ttc_s))
+        of_side += [due, ~due]
+        wrong += [due & ~warned, ~due & warned]
+    counts, sums = by_recording(of_side), 100 * by_recording(wrong)
+    low, high = _intervals(truth, counts, sums[None], unit)
+    sides = [
+        {
+            "n": int(n),
+            "share": round(total / n, decimals) if n else None,
+            "interval": [round(end, decimals) for end in ends] if np.isfinite(ends[0]) else None,
+        }
+        for n, total, *ends in zip(
+            counts.sum(axis=0).tolist(),
+            sums.sum(axis=0).tolist(),
+            low[0].tolist(),
+            high[0].tolist(),
+            strict=True,
+        )
+    ]
+    return [
+        {"threshold_s": threshold_s, "missed": missed, "false": false}
+        for threshold_s, missed, false in zip(THRESHOLDS_S, sides[::2], sides[1::2], strict=True)
     ]
 
 

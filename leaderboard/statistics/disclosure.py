@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evaluator import Difference
+from evaluator.metrics.protocol import PROTOCOLS
+from evaluator.metrics.registry import MID, RTE
 from leaderboard.boards.rows import Entry
 from leaderboard.models import Edition, Submission, Visibility
 from leaderboard.storage import hidden_marks
@@ -22,6 +24,8 @@ Floats = NDArray[np.float64]
 
 STEPS_IN_A_WIDTH: Final = 10
 _ROUND: Final = (5, 2, 1)
+HIDDEN_METRICS: Final = frozenset({MID, RTE})
+"""The metrics of hidden splits; any other one would tell more of the values than `docs/scoring.md` says."""
 
 
 # --- how fine --------------------------------------------------------------------------------------------
@@ -60,6 +64,11 @@ def coarse_ends(low: float, high: float, *, decimals: int) -> tuple[float, float
 def is_hidden(edition: Edition) -> bool:
     """Tell whether the ground truth is hidden, for workers: a mark outweighs the database."""
     return edition.split.is_hidden or hidden_marks.is_marked(edition.ground_truth_id)
+
+
+def hidden_protocols() -> tuple[str, ...]:
+    """Return the names of the protocols that a hidden split may have."""
+    return tuple(name for name, each in PROTOCOLS.items() if HIDDEN_METRICS.issuperset(each.metrics))
 
 
 def published_ends(low: Floats, high: Floats, *, edition: Edition) -> tuple[Floats, Floats]:

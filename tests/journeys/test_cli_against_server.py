@@ -9,7 +9,7 @@ import pytest
 from django.utils import timezone
 from pytest_django.live_server_helper import LiveServer
 
-from evaluator.metrics.protocol import SCORE_NAMES
+from evaluator.metrics.protocol import PROTOCOLS
 from leaderboard.editions import ground_truth
 from leaderboard.models import Submission, User
 from tests import builders
@@ -43,7 +43,8 @@ def submitted(tsttc: Tsttc, predictions: str, *more: str, method: str = "Foo++")
 
 @pytest.mark.parametrize("predictions", ["predictions.json", "predictions.scale_ratio.json"])
 def test_submission_scores_what_score_says_offline(tsttc: Tsttc, predictions: str) -> None:
-    offline = tsttc("score", predictions, "--truth", "truth.csv").stdout.splitlines()
+    arguments = ("score", predictions, "--truth", "truth.csv", "--protocol", "tsttc-2")
+    offline = tsttc(*arguments).stdout.splitlines()
     identity = submitted(tsttc, predictions)
     assert tsttc("status", identity).stdout.startswith("QUEUED, 0 ahead")
     assert builders.score_all() == 1
@@ -88,4 +89,4 @@ def test_board_shows_published_rows_and_the_owner_s_own(tsttc: Tsttc) -> None:
     assert document["sort"] == "-rte"
     errors = [entry["scores"]["rte"] for entry in document["entries"]]
     assert errors == sorted(errors, reverse=True)
-    assert tuple(document["entries"][0]["scores"]) == SCORE_NAMES
+    assert tuple(document["entries"][0]["scores"]) == PROTOCOLS["tsttc-2"].score_names

@@ -64,8 +64,16 @@ class World:
 
     def moved(self, masks: Masks) -> Floats:
         """What file 1 adds to the sums of a range, if these are the chosen sequences in it: (G, masks)."""
+        return self._added(masks, self.amounts)
+
+    def warned(self, column: int, masks: Masks) -> Floats:
+        """What file 1 adds to the sums of the warning error, if no prediction of file 0 warns: (G, masks)."""
+        # As if a warning were due in all of the crucial range, and every moved prediction crossed 2.7 s.
+        return self._added(masks, np.full(self.n_chosen, -100.0 if column == 0 else 100.0))
+
+    def _added(self, masks: Masks, amounts: Floats) -> Floats:
         added = np.zeros((len(self.counts), len(masks)))
-        added[: self.n_chosen] = ((masks >> np.arange(self.n_chosen)[:, None]) & 1) * self.amounts[:, None]
+        added[: self.n_chosen] = ((masks >> np.arange(self.n_chosen)[:, None]) & 1) * amounts[:, None]
         return added
 
 
@@ -99,16 +107,41 @@ def all_that_is_left(world: World, column: int, masks: Masks) -> Answers:
 
     The mean and its interval, and difference, interval and class of p next to another team's public method.
     """
+    sums = world.base[:, [column]] + world.moved(masks)
+    return _published_of(world.counts[:, [column]], sums, rival=world.rival[:, [column]])
+
+
+def with_warnings(world: World, column: int, masks: Masks) -> Answers:
+    """The mean of the warning error, for a reader who knows exactly how often file 0 is wrong."""
+    n = world.counts[:, column].sum()
+    sums = _warning_base(world, column).sum() + world.warned(column, masks).sum(axis=0)
+    return [(rounded(total / n, decimals=1),) for total in sums.tolist()]
+
+
+def all_with_warnings(world: World, column: int, masks: Masks) -> Answers:
+    """All that is published of both errors, for the reader of `all_that_is_left`."""
+    sums = _warning_base(world, column) + world.warned(column, masks)
+    counts = world.counts[:, [column]]
+    warnings = _published_of(counts, sums, rival=counts * 5)
+    return [
+        (*one, *other) for one, other in zip(all_that_is_left(world, column, masks), warnings, strict=True)
+    ]
+
+
+def _warning_base(world: World, column: int) -> Floats:
+    return world.counts[:, [column]] * (100.0 if column == 0 else 0.0)
+
+
+def _published_of(counts: Floats, sums: Floats, *, rival: Floats) -> Answers:
+    """What is published of each of these sums of one error (G, hypotheses), and a rival's (G, 1)."""
     from leaderboard.models import Edition, Split  # noqa: PLC0415 - needs Django's settings
     from leaderboard.statistics import disclosure  # noqa: PLC0415 - likewise
 
     edition = Edition(split=Split(is_hidden=True), decimals=1)
-    counts = world.counts[:, [column]]
-    sums = world.base[:, [column]] + world.moved(masks)
     low, high = Bootstrap(counts, rng=np.random.default_rng(2)).intervals(sums.T[:, :, None])
     ends = np.concatenate(disclosure.published_ends(low, high, edition=edition), axis=1)
-    gaps = sums - world.rival[:, [column]]
-    flips = sign_flips(gaps, np.repeat(counts, len(masks), axis=1), rng=np.random.default_rng(3))
+    gaps = sums - rival
+    flips = sign_flips(gaps, np.repeat(counts, sums.shape[1], axis=1), rng=np.random.default_rng(3))
     answers = []
     for i, total in enumerate(sums.sum(axis=0).tolist()):
         gap = Difference(
@@ -117,7 +150,7 @@ def all_that_is_left(world: World, column: int, masks: Masks) -> Answers:
             float(flips.high[i]),
             float(flips.p[i]),
         )
-        mean, other = total / counts.sum(), world.rival[:, column].sum() / counts.sum()
+        mean, other = total / counts.sum(), rival.sum() / counts.sum()
         shown = rounded_difference(gap, first=mean, second=other, decimals=1)
         public = disclosure.published_difference(gap, shown, edition=edition)
         answers.append(
@@ -199,7 +232,9 @@ def _either(one: Floats, other: Floats) -> Floats:
 WAYS: Final[dict[str, tuple[int, Channel | None]]] = {
     "means, two decimals": (2, None),
     "means, one decimal, as published": (1, None),
+    "the same and the warning error": (1, with_warnings),
     "bound, if all but the chosen labels were known": (1, all_that_is_left),
+    "the same and the warning error, bound": (1, all_with_warnings),
 }
 
 

@@ -18,7 +18,11 @@ class Command(RefusingCommand):
     def add_arguments(self, parser: ArgumentParser) -> None:
         parser.add_argument("split", help="val, test or demo")
         parser.add_argument("path", type=Path, help="a CSV file or a folder of annotation files")
-        parser.add_argument("--protocol", default=DEFAULT_PROTOCOL, choices=sorted(PROTOCOLS))
+        parser.add_argument(
+            "--protocol",
+            choices=sorted(PROTOCOLS),
+            help=f"default: {ground_truth.OPEN_PROTOCOL}, for a hidden split {DEFAULT_PROTOCOL}",
+        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         edition = ground_truth.import_truth(

@@ -85,8 +85,14 @@ class Group:
     """A metric over its columns."""
 
     title: str
+    symbol: str
     unit: str
     n_columns: int
+
+    @property
+    def is_narrow(self) -> bool:
+        """Tell whether it has no room for its title."""
+        return self.n_columns == 1
 
 
 def ends_of(entry: Entry, name: str) -> whiskers.Ends | None:
@@ -109,6 +115,7 @@ def score_groups(names: Iterable[str], *, n_whiskers: int = 0) -> tuple[Group, .
     return tuple(
         Group(
             title=f"{metric.title} ({metric.symbol})",
+            symbol=metric.symbol,
             unit=metric.unit,
             n_columns=len(columns) + (0 if i else n_whiskers),
         )

@@ -8,7 +8,7 @@ from uuid import UUID
 
 from django.core.paginator import Page, Paginator
 
-from evaluator.metrics.protocol import Protocol, TTCRange, grouped_names, range_of
+from evaluator.metrics.protocol import Protocol, TTCRange, grouped_names, range_of, split_name
 from evaluator.scoring.scores import floor_sentence
 from leaderboard.boards import movement
 from leaderboard.boards.listing import Board
@@ -34,6 +34,7 @@ from leaderboard.web.boards.score_columns import (
 from leaderboard.web.boards.whiskers import WhiskerScale
 
 ABSENT: Final = "–"
+N_WHOLE_METRICS: Final = 2  # with a column for each TTC range beside each other
 NEW_FOR: Final = timedelta(days=14)
 _WHY_UNSCORABLE: Final = {
     "missing-keys": "Edition {} added sequences that its file does not predict.",
@@ -123,7 +124,7 @@ class BoardTable:
 
 
 def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable:
-    names = board.rules.names_of(query.columns)
+    names = shown_names(board.rules, query.columns)
     is_of_one = len(grouped_names(names)) == 1
     has_intervals = any(ends_of(entry, name) for entry in board.entries for name in names)
     scales = _scales(board.entries, names if is_of_one and has_intervals else names[:1])
@@ -171,6 +172,17 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
         reason=_reason(board, has_intervals=has_intervals),
         floor=floor_sentence(edition.floor, decimals=edition.decimals) if edition else "",
     )
+
+
+def shown_names(rules: Protocol, columns: str) -> tuple[str, ...]:
+    """Return the scores with a column: those of the chosen metric, or of all as far as a screen has room.
+
+    Of all metrics together the third and any further one show their overall score; exports have every score.
+    """
+    names, whole = rules.names_of(columns), rules.overall_names[:N_WHOLE_METRICS]
+    if columns in rules.overall_names:
+        return names
+    return tuple(name for name in names if split_name(name)[0] in whole or name in rules.overall_names)
 
 
 def _new_among(entries: Sequence[Entry], *, today: date) -> frozenset[UUID]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from evaluator.counting import counted
-from evaluator.metrics.registry import Metric
+from evaluator.metrics.registry import WARNING_S, Metric
 from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import Entry
 from leaderboard.models import Analysis
@@ -34,6 +34,8 @@ _TTC_AXIS: Final = {
     "axisLabel": {"formatter": call("number")},
 }
 MEAN, SPAN = "Mean error", "95% confidence interval"
+MISSED, FALSE = "Missed warnings", "False alarms"
+SHARE: Final = "Share of sequences"
 Row = Mapping[str, Any]
 Reference = tuple[Entry, Sequence[Row]]
 
@@ -56,6 +58,14 @@ def error_analysis_tables(closer: Analysis, best: Reference | None) -> dict[str,
             for row in quantiles
         ],
         "scatter": scatter(content["scatter"]),
+        "warnings": warnings(content.get("warnings", ())),
+        "threshold": f"{WARNING_S:g} s",
+        "at_threshold": [
+            (name, _share_words(row[side]), grouped(row[side]["n"]), condition)
+            for row in content.get("warnings", ())
+            if row["threshold_s"] == WARNING_S
+            for name, side, condition in _SIDES
+        ],
         "worst": [
             (row["recording"], grouped(row["n"]), [format_rounded(row[metric.name]) for metric in errors])
             for row in content["worst"]
@@ -171,10 +181,82 @@ def _seconds(row: Row) -> str:
 
 
 def _value_words(row: Row, metric: Metric) -> str:
-    value, interval = format_rounded(row[metric.name]), _interval(row, metric)
+    return _with_interval(row[metric.name], _interval(row, metric))
+
+
+def _with_interval(value: float | None, interval: Sequence[float] | None) -> str:
     if interval is None:
-        return value
-    return f"{value} ({format_rounded(interval[0])} to {format_rounded(interval[1])})"
+        return format_rounded(value)
+    return f"{format_rounded(value)} ({format_rounded(interval[0])} to {format_rounded(interval[1])})"
+
+
+# --- who is warned ---------------------------------------------------------------------------------------
+
+_SIDES: Final = (
+    (MISSED, "missed", f"0 < τ ≤ {WARNING_S:g} s"),
+    (FALSE, "false", f"τ ≤ 0 or τ > {WARNING_S:g} s"),
+)
+
+
+def warnings(rows: Sequence[Row]) -> Chart:
+    """Draw the shares of missed warnings and of false alarms by the threshold of a warning."""
+    if not rows:
+        return empty("warnings")
+    has_intervals = any(row[side]["interval"] for row in rows for _, side, _ in _SIDES)
+    axis = {"type": "value", "min": rows[0]["threshold_s"], "max": rows[-1]["threshold_s"], "interval": 1}
+    frame = Frame(
+        x_axes=[x_axis("Threshold in s", axis) for _ in _SIDES],
+        y_axes=[y_axis(f"{name}, %", {"type": "value", "min": 0}) for name, _, _ in _SIDES],
+        series=[
+            series
+            for i, (name, side, _) in enumerate(_SIDES)
+            for series in _side_series([row for row in rows if row[side]["n"]], name, side, grid=i)
+        ],
+        names=[SHARE, SPAN] if has_intervals else [],
+    )
+    columns = ("Threshold in s", *(text for name, _, _ in _SIDES for text in ("Sequences", f"{name} %")))
+    return Chart(
+        kind="warnings",
+        label="Missed warnings and false alarms by the threshold of a warning.",
+        options=frame.options(),
+        columns=columns,
+        rows=tuple(
+            (
+                tick_text(row["threshold_s"]),
+                *(
+                    text
+                    for _, side, _ in _SIDES
+                    for text in (grouped(row[side]["n"]), _share_words(row[side]))
+                ),
+            )
+            for row in rows
+        ),
+        numbers=tuple(range(1, len(columns))),
+        has_intervals=has_intervals,
+    )
+
+
+def _side_series(rows: Sequence[Row], name: str, side: str, *, grid: int) -> Iterator[Option]:
+    points = [
+        Mark(
+            row["threshold_s"],
+            row[side]["share"],
+            (
+                f"{tick_text(row['threshold_s'])} s",
+                f"{name} {_share_words(row[side])} %",
+                f"of {counted(row[side]['n'], 'sequence')}",
+            ),
+        )
+        for row in rows
+    ]
+    spans = [(row["threshold_s"], *row[side]["interval"]) for row in rows if row[side]["interval"]]
+    yield band(SPAN, spans, "--s1", grid=grid)
+    yield line(SHARE, [(mark.x, mark.y) for mark in points], "--s1", grid=grid)
+    yield marks(SHARE, points, Look("--s1", size=5.0), grid=grid) | {"upright": True}
+
+
+def _share_words(share: Row) -> str:
+    return _with_interval(share["share"], share["interval"])
 
 
 # --- how errors are distributed --------------------------------------------------------------------------

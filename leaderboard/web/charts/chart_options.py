@@ -43,6 +43,10 @@ class Chart:
     note: str = ""  # in a sentence, what it leaves out
 
     @property
+    def n_panels(self) -> int:
+        return len(self.options["baseOption"]["yAxis"])
+
+    @property
     def has_links(self) -> bool:
         series = self.options["baseOption"]["series"]
         return any("href" in mark for each in series for mark in each["data"])
@@ -210,7 +214,7 @@ class Frame:
     narrow_series: Sequence[Option] = ()  # what differs in each series where it is narrow
 
     def options(self) -> Option:
-        """Return the options of one panel, or of two that stack on a narrow screen."""
+        """Return the options of panels side by side, which stack on a narrow screen."""
         n_panels = len(self.x_axes)
         base = {
             "animation": False,
@@ -224,7 +228,7 @@ class Frame:
             "series": list(self.series),
             **self.more,
         }
-        narrow = {"maxWidth": NARROW_PX}
+        narrow = {"maxWidth": max(NARROW_PX, NARROW_PX * n_panels // 2)}
         media: list[Option] = [{"option": self._layout(n_panels, is_narrow=False)}]
         option = self._layout(n_panels, is_narrow=True)
         if self.narrow_series:
@@ -270,8 +274,10 @@ class Frame:
 
 def _grids(n_panels: int, *, left: int, top: int, is_narrow: bool) -> list[Option]:
     sides = {"left": left, "right": 12, "bottom": 44 if left == _LEFT_PX else 8}
-    if n_panels == 1:
-        return [{**sides, "top": top}]
-    if is_narrow:
-        return [{**sides, "top": top, "bottom": "56%"}, {**sides, "top": "56%"}]
-    return [{**sides, "top": top, "right": "53%"}, {**sides, "top": top, "left": "53%"}]
+    before, after = ("top", "bottom") if is_narrow else ("left", "right")
+    gap = 6 if is_narrow else 3  # per cent beside the border of two panels
+    grids: list[Option] = [{**sides, "top": top} for _ in range(n_panels)]
+    for number in range(1, n_panels):
+        grids[number - 1][after] = f"{100 * (n_panels - number) / n_panels + gap:.0f}%"
+        grids[number][before] = f"{100 * number / n_panels + gap:.0f}%"
+    return grids

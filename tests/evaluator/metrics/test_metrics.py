@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from evaluator import evaluate
 from evaluator.metrics.protocol import known_metrics
-from evaluator.metrics.registry import MID, RTE, Metric
+from evaluator.metrics.registry import MID, RTE, WARNING, Metric
 from evaluator.predictions.loading import Predictions
 from tests.evaluator.worlds import errors_of_the_toolkit, make_truth, means_of_the_toolkit
 
@@ -40,7 +40,8 @@ def test_a_perfect_prediction_has_no_error(metric: Metric) -> None:
 def test_errors_are_finite_and_not_negative(metric: Metric) -> None:
     errors = metric.errors(PREDICTED_S, TRUE_S)
     assert np.isfinite(errors).all()
-    assert (errors > 0).all()
+    assert (errors >= 0).all()
+    assert (errors > 0).any()
 
 
 @every_metric
@@ -51,13 +52,15 @@ def test_scalars_and_arrays_broadcast(metric: Metric) -> None:
 
 @every_metric
 @given(true_s=times, nearer=st.floats(0.01, 0.2), farther=st.floats(0.25, 0.9))
-def test_a_prediction_further_off_on_the_same_side_is_worse(
+def test_a_prediction_further_off_on_the_same_side_is_not_better(
     metric: Metric, true_s: float, nearer: float, farther: float
 ) -> None:
     for direction in (1, -1):
         near, far = true_s * (1 + direction * nearer), true_s * (1 + direction * farther)
         if min(near, far) > 0.15 or max(near, far) < -0.15:
-            assert metric.errors(near, true_s) < metric.errors(far, true_s)
+            of_near, of_far = metric.errors(near, true_s), metric.errors(far, true_s)
+            # The warning error knows two sides only.
+            assert of_near <= of_far if metric is WARNING else of_near < of_far
 
 
 @given(predicted_s=times, true_s=times)
@@ -66,6 +69,26 @@ def test_single_sequences_equal_the_toolkits_arithmetic(predicted_s: float, true
     for metric in (MID, RTE):
         error = float(metric.errors(predicted_s, true_s))
         assert error == pytest.approx(expected[metric.name], rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize(
+    ("predicted_s", "true_s", "error"),
+    [
+        (2.7, 1.0, 0.0),
+        (2.71, 1.0, 100.0),
+        (2.7, 2.71, 100.0),
+        (-1.0, 1.0, 100.0),
+        (-0.2, -0.2, 0.0),
+        (0.05, -5.0, 100.0),
+        (math.inf, 2.7, 100.0),
+        (10.0, -10.0, 0.0),
+    ],
+)
+def test_the_warning_error_is_100_on_the_wrong_side_of_the_threshold(
+    predicted_s: float, true_s: float, error: float
+) -> None:
+    assert float(WARNING.errors(predicted_s, true_s)) == error
+    assert math.isnan(WARNING.errors(math.nan, true_s))
 
 
 def test_mid_keeps_its_accuracy_where_the_logarithms_cancel() -> None:

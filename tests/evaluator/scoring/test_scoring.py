@@ -95,11 +95,13 @@ elsewhere = (st.floats(0.05) | st.floats(max_value=-0.15)).filter(lambda value: 
 
 
 @given(predicted_s=st.lists(elsewhere, min_size=1, max_size=20))
-def test_both_protocols_agree_exactly_away_from_zero(predicted_s: list[float]) -> None:
+def test_all_protocols_agree_exactly_away_from_zero(predicted_s: list[float]) -> None:
     truth = make_truth(np.linspace(1, 19, len(predicted_s)))
     given_predictions = given_values(truth, predicted_s)
-    board, toolkit = (evaluate(given_predictions, truth, protocol=name) for name in ("tsttc-1", "toolkit"))
-    assert board.scores == toolkit.scores
+    board, warnings, toolkit = (
+        evaluate(given_predictions, truth, protocol=name).flat() for name in ("tsttc-1", "tsttc-2", "toolkit")
+    )
+    assert board == toolkit == {name: warnings[name] for name in board}
 
 
 @given(predicted_s=st.lists(near_zero.filter(bool), min_size=1, max_size=20))

@@ -1,5 +1,6 @@
 """`ground_truth.import_truth` and its command."""
 
+import re
 import stat
 from io import StringIO
 from pathlib import Path
@@ -30,6 +31,31 @@ def test_first_import_opens_and_publishes_edition_one(tmp_path: Path) -> None:
     assert edition.ground_truth.counts["overall"] == builders.N_SEQUENCES
     assert edition.ground_truth.counts["out_of_range"] == 1
     assert set(AuditEvent.objects.values_list("verb", flat=True)) == {"imported", "opened", "published"}
+
+
+@pytest.mark.parametrize(
+    ("split", "protocol"), [("test", "tsttc-1"), ("val", "tsttc-2"), ("demo", "tsttc-2")]
+)
+def test_an_open_split_opens_under_the_protocol_with_the_warning_error(
+    tmp_path: Path, split: str, protocol: str
+) -> None:
+    call_command("import_truth", split, str(builders.truth_csv(tmp_path / "t.csv")), stdout=StringIO())
+    assert Edition.objects.get().protocol == protocol
+
+
+def test_a_hidden_split_gets_no_metric_that_tells_more_of_its_values(tmp_path: Path) -> None:
+    words = (
+        "The ground truth of the split 'test' is hidden, and protocol 'tsttc-2' would tell more of it "
+        "(Warning error) than a submission may; expected one of tsttc-1, toolkit."
+    )
+    path = str(builders.truth_csv(tmp_path / "t.csv"))
+    with pytest.raises(CommandError, match=re.escape(words)):
+        call_command("import_truth", "test", path, protocol="tsttc-2")
+    assert not GroundTruth.objects.exists()
+    builders.import_truth(tmp_path)
+    with pytest.raises(CommandError, match=re.escape(words)):
+        call_command("open_edition", "test", truth=Path(path), protocol="tsttc-2")
+    assert Edition.objects.count() == 1
 
 
 def test_values_are_kept_in_the_private_directory_for_their_owner_only(tmp_path: Path) -> None:

@@ -8,9 +8,11 @@ from django.utils import timezone
 
 import evaluator
 from evaluator import get_protocol
+from evaluator.metrics.registry import WARNING_S
 from leaderboard.models import Analysis, Edition, Split, Submission, User
 from leaderboard.statistics import analyses
 from leaderboard.storage import files, truth_values
+from leaderboard.web.charts import analysis_charts
 from tests import builders
 from tests.editions import ANYBODY
 
@@ -70,6 +72,46 @@ def test_the_owner_sees_what_a_plain_loop_finds(sent: Submission, val: Edition, 
     for row in worst:
         own = sequences["mid"][bags == row["recording"]]
         assert (row["n"], row["mid"]) == (len(own), pytest.approx(float(own.mean()), abs=0.0051))
+
+
+def test_missed_warnings_and_false_alarms_are_what_a_plain_loop_counts(val: Edition, owner: User) -> None:
+    truth = truth_values.load(val.ground_truth_id)
+    # Multiples of the truth on both sides of it, and some with the other sign.
+    predicted_s = truth.ttc_s * np.resize([1.5, 0.7, 1.0, -1.0], truth.n_sequences)
+    predictions = evaluator.Predictions.from_arrays(ttc_s=predicted_s, manifest=truth.manifest)
+    content = analyses.content_of(predictions, truth, rules=get_protocol("tsttc-2"))
+    report = evaluator.evaluate(predictions, truth, protocol="tsttc-2", keep_sequences=True)
+    assert [row["threshold_s"] for row in content["warnings"]] == list(analyses.THRESHOLDS_S)
+    for row in content["warnings"]:
+        due, other, n_missed, n_false = 0, 0, 0, 0
+        for tau, predicted in zip(
+            truth.ttc_s.tolist(), report.require_details().predicted_ttc_s, strict=True
+        ):
+            warns = 0 < predicted <= row["threshold_s"]
+            if 0 < tau <= row["threshold_s"]:
+                due, n_missed = due + 1, n_missed + (not warns)
+            else:
+                other, n_false = other + 1, n_false + warns
+        for side, n, n_wrong in (("missed", due, n_missed), ("false", other, n_false)):
+            assert row[side]["n"] == n
+            assert row[side]["share"] == pytest.approx(100 * n_wrong / n, abs=0.0051)
+            low, high = row[side]["interval"] or (0, 100)
+            assert low <= row[side]["share"] <= high
+        if row["threshold_s"] == WARNING_S:
+            assert report.flat()["warning"] == pytest.approx(100 * (n_missed + n_false) / (due + other))
+    assert any(row["false"]["interval"] for row in content["warnings"])
+    assert "warnings" not in analyses.content_of(predictions, truth, rules=get_protocol("tsttc-1"))
+
+
+def test_without_a_warning_due_there_is_no_share(val: Edition) -> None:
+    table = truth_values.load(val.ground_truth_id).to_table()
+    table.ttc_s = [abs(tau) + 5 for tau in table.ttc_s]
+    truth = evaluator.GroundTruth.from_table(table)
+    predictions = evaluator.Predictions.from_arrays(ttc_s=truth.ttc_s, manifest=truth.manifest)
+    content = analyses.content_of(predictions, truth, rules=get_protocol("tsttc-2"))
+    assert all(row["missed"] == {"n": 0, "share": None, "interval": None} for row in content["warnings"])
+    chart = analysis_charts.warnings(content["warnings"])
+    assert all(row[1:3] == ("0", "–") for row in chart.rows)
 
 
 def test_a_closer_look_is_for_the_team_alone(

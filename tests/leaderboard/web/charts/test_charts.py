@@ -286,6 +286,33 @@ def test_errors_by_time_stand_beside_those_of_the_best_public_row(
     ]
 
 
+def test_three_metrics_have_three_panels_and_a_chart_of_who_is_warned(
+    client: Client, tmp_path: Path, benchmark: None, owner: User
+) -> None:
+    edition = builders.import_truth(tmp_path, split="val", protocol="tsttc-2")
+    sent = builders.submit(owner, builders.predictions(edition), split="val")
+    builders.score_all()
+    builders.infer_all()
+    client.force_login(owner)
+    analysis, charts = get(client, f"/submissions/{sent.pk}/analysis/"), get(client, "/board/val/charts/")
+    figures = {
+        figure.attributes["data-chart"]: figure for figure in (*charts.all("figure"), *analysis.all("figure"))
+    }
+    for kind, n_panels in (("profile", 3), ("curve", 3), ("warnings", 2)):
+        options = json.loads(figures[kind].one("script").raw_text)
+        for each in options["media"]:
+            grids = each["option"]["grid"]
+            assert len(grids) == n_panels
+            sides = {(grid["left"], grid["top"]) for grid in grids}
+            assert len(sides) == n_panels, "no panel lies on another"
+        assert {axis["gridIndex"] for axis in options["baseOption"]["yAxis"]} == set(range(n_panels))
+    rows = [[cell.text for cell in row.all("td")] for row in figures["warnings"].one("tbody").all("tr")]
+    assert [row[0] for row in rows] == ["1", "1.5", "2", "2.5", "2.7", "3", "3.5", "4", "4.5", "5"]
+    missed, false_alarms = (each.text for each in analysis.one("dl").all("dd"))
+    assert missed == f"{rows[4][2]} % of {rows[4][1]} sequences with 0 < τ ≤ 2.7 s"
+    assert false_alarms == f"{rows[4][4]} % of {rows[4][3]} sequences with τ ≤ 0 or τ > 2.7 s"
+
+
 def test_of_a_large_board_the_front_and_the_lowest_are_drawn_and_the_chart_says_so(
     edition: Edition, entries: list[Submission], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -61,6 +61,7 @@ def test_opening_says_that_values_are_never_uploaded(keeper: Client, rescored: E
         ({"digest": "sha256:0"}, "That ground truth is not this split's"),
         ({"digest": ""}, "No ground truth was chosen"),
         ({"protocol": "mine"}, f"There is no such protocol; expected one of {', '.join(PROTOCOLS)}."),
+        ({"protocol": "tsttc-2"}, "is hidden, and protocol 'tsttc-2' would tell more of it (Warning error)"),
     ],
 )
 def test_what_cannot_be_opened_is_refused_in_a_sentence(
