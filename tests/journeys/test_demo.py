@@ -99,6 +99,7 @@ def test_the_demo_shows_scored_submissions_survives_a_dead_worker_and_ends_clean
         maintainer = Visitor(site)
         maintainer.post_form("/accounts/login/", {"login": "maintainer@example.org", "password": login[2]})
         assert "Queue" in maintainer.text_of("/maintain/")
+        maintainer.close()
         assert "simulated" in visitor.text_of("/board/demo/").lower()
         assert f"pip install {url}/dist/tsttc-" in visitor.text_of("/dist/")
         assert "anno_id" in visitor.text_of("/docs/search/?q=anno_id")
