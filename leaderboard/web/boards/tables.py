@@ -8,6 +8,7 @@ from uuid import UUID
 
 from django.core.paginator import Page, Paginator
 
+from evaluator.counting import counted
 from evaluator.metrics.protocol import Protocol, TTCRange, grouped_names, range_of, split_name
 from evaluator.scoring.scores import floor_sentence
 from leaderboard.boards import movement
@@ -15,7 +16,7 @@ from leaderboard.boards.listing import Board
 from leaderboard.boards.rows import Entry
 from leaderboard.exports.tables import team_of
 from leaderboard.methods import details
-from leaderboard.models import Edition, Visibility
+from leaderboard.models import Edition
 from leaderboard.statistics import confidence
 from leaderboard.web.boards import whiskers
 from leaderboard.web.boards.board_query import PER_PAGE, BoardQuery
@@ -259,8 +260,4 @@ def _text_heading(name: str, query: BoardQuery) -> Heading:
 
 
 def _attempts(entry: Entry) -> str:
-    if entry.n_attempts is None:
-        return ""
-    noun = "submission" if entry.n_attempts == 1 else "submissions"
-    is_of_team = entry.visibility == Visibility.PUBLIC
-    return f"{entry.n_attempts:,} {'team ' if is_of_team else ''}{noun}"
+    return "" if entry.n_attempts is None else counted(entry.n_attempts, "submission")
