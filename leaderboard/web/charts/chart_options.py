@@ -211,7 +211,8 @@ class Frame:
     )  # px before the ground, where it is wide and where it is narrow
     top: int = 0  # px more than usual above it
     more: Mapping[str, Any] = field(default_factory=dict)
-    narrow_series: Sequence[Option] = ()  # what differs in each series where it is narrow
+    # What differs in each series where it is wide, and where it is narrow.
+    series_by_width: tuple[Sequence[Option], Sequence[Option]] = ((), ())
 
     def options(self) -> Option:
         """Return the options of panels side by side, which stack on a narrow screen."""
@@ -230,16 +231,15 @@ class Frame:
         }
         narrow = {"maxWidth": max(NARROW_PX, NARROW_PX * n_panels // 2)}
         media: list[Option] = [{"option": self._layout(n_panels, is_narrow=False)}]
-        option = self._layout(n_panels, is_narrow=True)
-        if self.narrow_series:
-            option["series"] = list(self.narrow_series)
-        media.append({"query": narrow, "option": option})
+        media.append({"query": narrow, "option": self._layout(n_panels, is_narrow=True)})
         return {"baseOption": base, "media": media}
 
     def _layout(self, n_panels: int, *, is_narrow: bool) -> Option:
         left = self.left[is_narrow]
         top = 38 + self.top + 22 * self._n_legend_lines(320 if is_narrow else NARROW_PX)
         layout = {"legend": self._legend(), "grid": _grids(n_panels, left=left, top=top, is_narrow=is_narrow)}
+        if self.series_by_width[is_narrow]:
+            layout["series"] = list(self.series_by_width[is_narrow])
         if n_panels > 1:  # one above the other, only the last has room for a name below it
             shown = [not is_narrow or number == n_panels - 1 for number in range(n_panels)]
             names = [axis["name"] if keeps else "" for axis, keeps in zip(self.x_axes, shown, strict=True)]

@@ -93,7 +93,10 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
         x_axes=[ranks_axis([str(entry.rank) for entry in entries[1:]], name="Rank of the other method")],
         y_axes=[ranks_axis([_named(entry) for entry in entries[:-1]], is_upright=True)],
         series=[_series(name, [cell for cell in pair_cells if cell.verdict == name]) for name in verdicts],
-        narrow_series=[{"label": {"show": len(entries) <= _FEW_ON_A_PHONE}} for _ in verdicts],
+        series_by_width=(
+            [{"label": {"show": True}} for _ in verdicts],
+            [{"label": {"show": len(entries) <= _FEW_ON_A_PHONE}} for _ in verdicts],
+        ),
         names=verdicts,
         left=(220, 120),
         top=30,

@@ -188,6 +188,9 @@ def test_what_is_being_computed_is_no_missing_test_and_comes_by_itself(
     assert "hx-trigger" not in get(client, "/board/test/charts/").one("section", id="pairs").attributes
     cells = [mark for series in options_of(pairs_figure(client))["series"] for mark in series["data"]]
     assert all(cell["text"].startswith("−") for cell in cells), "the row is better"
+    # Both say whether differences are shown: a page that was narrow keeps what it was given.
+    media = json.loads(pairs_figure(client).one("script").raw_text)["media"]
+    assert all("show" in each["label"] for layout in media for each in layout["option"]["series"])
 
 
 def test_first_rows_are_compared_once_the_page_is_read(client: Client, compared: list[Submission]) -> None:
