@@ -32,7 +32,7 @@ _NEWS: Final = timedelta(days=1)
 _OUTCOMES: Final = {
     Status.SCORED: "is scored",
     Status.REJECTED: "is rejected: the file has problems, which the page lists",
-    Status.SYSTEM_ERROR: "could not be scored: this was our fault, and the maintainers have been told",
+    Status.SYSTEM_ERROR: "could not be scored: a system error, which the maintainers see",
 }
 
 

@@ -34,7 +34,7 @@ def test_a_command_whose_reader_has_left_ends_without_a_traceback() -> None:
 def test_every_command_has_one_row_in_the_maintainers_guide_and_one_in_the_list() -> None:
     own = {name for name, app in get_commands().items() if app == "leaderboard"}
     guide = (REPOSITORY / "docs/maintainers.md").read_text("utf-8")
-    table = guide.partition("## Where each thing is done\n")[2].partition("\n## ")[0]
+    table = guide.partition("## Where to find things\n")[2].partition("\n## ")[0]
     guide_rows = [set(re.findall(r"`(?:make )?(\w+)[^`]*`", row)) & own for row in table.splitlines()]
     assert sorted(name for row in guide_rows for name in row) == sorted(own)
     listed = (
