@@ -60,8 +60,8 @@ def test_phone_shows_one_range_and_the_visitor_chooses_which(new_page: NewPage, 
     page = new_page(viewport=NARROW)
     page.goto(BOARD)
     heads = page.locator("table.board thead tr").last.locator("th:visible")
-    expect(heads).to_have_count(5)
-    assert [re.split(r"\s", text.strip())[0] for text in heads.all_inner_texts()][-2:] == ["MiD", "RTE"]
+    expect(heads).to_have_count(6)
+    assert [re.split(r"\s", text.strip())[0] for text in heads.all_inner_texts()][-3:] == ["MiD", "RTE", "WE"]
     page.get_by_label("0–3 s", exact=True).check()
     assert [text.strip()[:5] for text in heads.all_inner_texts()][-2:] == ["0–3 s", "0–3 s"]
     page.locator("table.board tbody input").first.check()
