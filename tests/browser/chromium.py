@@ -88,8 +88,8 @@ def sign_in(page: Page, email: str, *, password: str = PASSWORD) -> None:
     page.get_by_label("Email").fill(email)
     page.get_by_label("Password", exact=True).fill(password)
     page.get_by_role("button", name="Sign in").click()
-    # Where people submit, and where maintainers see what waits for them.
-    page.wait_for_url(re.compile("/(submit|maintain)/$"))
+    # What people have sent, and where maintainers see what waits for them.
+    page.wait_for_url(re.compile("/(submissions|maintain)/$"))
 
 
 FOCUSED_NAME = """() => {
