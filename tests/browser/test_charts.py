@@ -128,7 +128,7 @@ def test_chart_follows_light_and_dark(page: Page, board: None) -> None:
     expect(legend).not_to_have_attribute("fill", light or "")
 
 
-def test_how_to_read_a_chart_is_said_once_on_a_page(page: Page, board: None) -> None:
+def test_a_page_has_one_hint_how_to_read_its_charts(page: Page, board: None) -> None:
     page.goto(CHARTS)
     assert page.locator(".plot-foot").count() > 1
     expect(page.locator(".hint:visible")).to_have_count(1)
