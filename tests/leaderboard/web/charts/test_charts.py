@@ -312,8 +312,8 @@ def test_three_metrics_have_three_panels_and_a_chart_of_who_is_warned(
     rows = [[cell.text for cell in row.all("td")] for row in figures["warnings"].one("tbody").all("tr")]
     assert [row[0] for row in rows] == ["1", "1.5", "2", "2.5", "2.7", "3", "3.5", "4", "4.5", "5"]
     missed, false_alarms = (each.text for each in analysis.one("dl").all("dd"))
-    assert missed == f"{rows[4][2]} % of {rows[4][1]} sequences with 0 < τ ≤ 2.7 s"
-    assert false_alarms == f"{rows[4][4]} % of {rows[4][3]} sequences with τ ≤ 0 or τ > 2.7 s"
+    assert missed == f"{rows[4][2]}% of {rows[4][1]} sequences with 0 < τ ≤ 2.7 s"
+    assert false_alarms == f"{rows[4][4]}% of {rows[4][3]} sequences with τ ≤ 0 or τ > 2.7 s"
 
 
 def test_of_a_large_board_the_front_and_the_lowest_are_drawn_and_the_chart_says_so(
