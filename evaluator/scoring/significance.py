@@ -20,7 +20,7 @@ LEAST_P: Final = 0.0001
 MIN_DEGREES: Final = 8.0
 """With fewer degrees of freedom nothing is said of a mean: too few units to know how much they vary."""
 
-# Of the normal distribution's 97.5% point: what a difference must be to be found with a power of 80 %.
+# Of the normal distribution's 97.5% point: what a difference must be to be found with a power of 80%.
 _DETECTABLE: Final = (1.959964 + 0.841621) / 1.959964
 
 

@@ -1,11 +1,10 @@
-"""The page for a failure of the server."""
+"""The pages for a failure of the server and for a malformed request."""
 
 import sys
 
 from django.conf import settings
-from django.http import HttpRequest, HttpResponse, HttpResponseServerError
+from django.http import HttpRequest, HttpResponse, HttpResponseBadRequest, HttpResponseServerError
 from django.template.loader import render_to_string
-from django.views import defaults
 
 from leaderboard.errors import outages, problem_codes
 
@@ -30,6 +29,6 @@ def server_error(request: HttpRequest) -> HttpResponse:
 
 def bad_request(request: HttpRequest, exception: Exception) -> HttpResponse:
     if not request.path.startswith("/api/"):
-        return defaults.bad_request(request, exception)
+        return HttpResponseBadRequest(render_to_string("400.html", {"benchmark": settings.BENCHMARK}))
     sentence = "The request is malformed or incomplete; expected a complete request, as the API describes it."
     return problem_codes.response(status=400, code="bad-request", detail=sentence)

@@ -8,6 +8,7 @@ import json
 from datetime import timedelta
 from typing import Final
 
+from django.conf import settings
 from django.template.loader import render_to_string
 from django.utils import timezone
 
@@ -91,4 +92,5 @@ def failures() -> str:
         "failure-500": ("500.html", {}),
         "failure-503": ("outage.html", {"outage": outages.DATABASE_AWAY}),
     }
-    return json.dumps({name: render_to_string(path, context) for name, (path, context) in pages.items()})
+    common = {"benchmark": settings.BENCHMARK}
+    return json.dumps({name: render_to_string(path, common | more) for name, (path, more) in pages.items()})

@@ -106,6 +106,7 @@ def test_malformed_requests_are_answered_alike_before_any_view(db: None, setting
         page = Client().get("/", headers={"Referer": referer})
         assert (page.status_code, page.headers["Content-Type"]) == (400, "text/html; charset=utf-8")
         assert "Invalid request" in page.content.decode()
+        assert "TSTTC leaderboard" in page.content.decode()
 
 
 # --- pagination ------------------------------------------------------------------------------------------
