@@ -41,6 +41,7 @@ def render_board(
     query, faults = board_query.forgiving(request.GET, now=now, has_time=edition is None)
     shown, query = _shown(request, split, edition, query, faults)
     primary = shown.rules.primary.symbol
+    ladder = rank_ladder(shown.unfiltered, primary=shown.rules.score_names[0])
     context = {
         "board": shown,
         "table": tables.board_table(shown, query=query, now=now),
@@ -51,13 +52,15 @@ def render_board(
             faults=faults,
             latest_day=now.date() if edition is None and split.current_edition else None,
         ),
-        "ladder": rank_ladder(shown.unfiltered, primary=shown.rules.score_names[0]),
+        "ladder": ladder,
         "exports": export_views.offers(shown, edition, query),
         # Where one can submit instead.
         "open_splits": []
         if shown.is_open
         else [each for each in splits_of(request) if admissions.is_open(each, now=now)],
-        "profile": None if chart_views.has_progress(shown) else chart_views.profile(shown),
+        "profile": None
+        if chart_views.has_progress(shown)
+        else chart_views.profile(shown, n_metrics=1 if ladder else 2),
         "n_profiles": chart_views.N_PROFILES,
         "progress_label": f"{primary} of each method by date, with the lowest {primary} so far.",
         "n_withdrawn": sum(entry.withdrawn_at is not None for entry in shown.unfiltered),

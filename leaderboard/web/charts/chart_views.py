@@ -66,9 +66,9 @@ def has_progress(board: Board) -> bool:
     return board_charts.has_progress(_public(board), _attempts(board))
 
 
-def profile(board: Board) -> Chart:
+def profile(board: Board, *, n_metrics: int | None = None) -> Chart:
     """Draw the errors by TTC range of the first public rows of a board."""
-    return profile_chart.profile(_public(board)[:N_PROFILES])
+    return profile_chart.profile(_public(board)[:N_PROFILES], n_metrics=n_metrics)
 
 
 def _public(board: Board) -> list[Entry]:

@@ -1,5 +1,6 @@
 """The chart of errors by TTC range, with confidence intervals, of up to five methods."""
 
+import itertools
 from collections.abc import Sequence
 
 from django.utils.html import format_html
@@ -24,11 +25,13 @@ from leaderboard.web.charts.chart_series import SERIES_INKS, SERIES_SYMBOLS, Loo
 from leaderboard.web.formatting import figure_css, interval_words
 
 
-def profile(entries: Sequence[Entry]) -> Chart:
+def profile(entries: Sequence[Entry], *, n_metrics: int | None = None) -> Chart:
+    """Draw errors by TTC range, one panel for each metric, or for the first `n_metrics`."""
     shown = [entry for entry in entries if entry.value is not None][: len(SERIES_INKS)]
     if not shown:
         return empty("profile")
-    panels, legend = grouped_names(shown[0].scores), _legend_names(shown)
+    panels = dict(list(grouped_names(shown[0].scores).items())[:n_metrics])
+    legend = _legend_names(shown)
     frame = Frame(
         x_axes=[x_axis("", names_axis([_range_words(name) for name in names])) for names in panels.values()],
         y_axes=[error_axis(metric, _all_ends(shown, names)) for metric, names in panels.items()],
@@ -63,7 +66,7 @@ def profile(entries: Sequence[Entry]) -> Chart:
                 split_name(name)[1],
                 *(_profile_cell(entry, name, css, most) for entry in shown),
             )
-            for name in shown[0].scores
+            for name in itertools.chain(*panels.values())
         ),
         has_intervals=any(each.low is not None for entry in shown for each in entry.intervals.values()),
     )

@@ -92,6 +92,6 @@ def _leading(main: Split, *, now: datetime) -> dict[str, Any]:
         "leaders": leaders(board),
         "lead": lead_words(board),
         "range_leaders": range_leaders(board),
-        "profile": profile_chart.profile(board.entries[:N_LEADERS]),
+        "profile": profile_chart.profile(board.entries[:N_LEADERS], n_metrics=2),
         "progress": chart_views.progress(board, now=now),
     }
