@@ -88,13 +88,13 @@ def holds_offline(edition: Edition, sent: list[Submission], *, unit: str) -> Non
     """The board's intervals and comparisons are those of the library with this unit."""
     truth = truth_values.load(edition.ground_truth_id)
     for each in sent:
-        offline = confidence_intervals(read(each, truth), truth, unit=unit)
+        offline = confidence_intervals(read(each, truth), truth, protocol=edition.rules, unit=unit)
         for name, score in scores_of(each, edition).items():
             expected = [rounded(end, decimals=1) for end in offline[name] or (None, None)]
             assert [score.low, score.high] == expected, name
     pair = compared(*sent[:2], edition=edition).pairs[0].differences
     first, second = (read(each, truth) for each in sent[:2])
-    assert pair == compare_predictions(first, second, truth, decimals=1, unit=unit)
+    assert pair == compare_predictions(first, second, truth, protocol=edition.rules, decimals=1, unit=unit)
 
 
 def test_intervals_ranges_and_tests_of_an_edition_of_days_are_over_days(tmp_path: Path, owner: User) -> None:
