@@ -118,7 +118,7 @@ def test_menu_and_legend_open_and_close_by_keyboard_and_an_export_is_copied(
     page = new_page(viewport=WIDE, permissions=["clipboard-read", "clipboard-write"])
     page.goto(BOARD)
     page.locator(".legend summary").press("Enter")
-    expect(page.get_by_text("The board is ranked by overall MiD.")).to_be_visible()
+    expect(page.get_by_text("Ranked by overall MiD")).to_be_visible()
     menu = page.locator("details.exports")
     menu.locator("summary").press("Enter")
     with timers_at_rest(page):
