@@ -125,7 +125,20 @@ LOW_CONTRAST = """() => {
   };
   const linear = v => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
   const light = ([r, g, b]) => 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+  // In a drawing a text stands on the last shape that was filled below its middle.
+  const below = e => {
+    const {x, y, width, height} = e.getBoundingClientRect(), [cx, cy] = [x + width / 2, y + height / 2];
+    const shapes = [...e.ownerSVGElement.querySelectorAll("path, rect, circle")].reverse();
+    const shape = shapes.find(each => {
+      const box = each.getBoundingClientRect(), {fill, fillOpacity} = getComputedStyle(each);
+      const isBefore = each.compareDocumentPosition(e) & Node.DOCUMENT_POSITION_FOLLOWING;
+      const holds = box.left <= cx && cx <= box.right && box.top <= cy && cy <= box.bottom;
+      return isBefore && holds && fill !== "none" && fillOpacity === "1";
+    });
+    return shape && parse(getComputedStyle(shape).fill);
+  };
   const ground = e => {
+    if (e instanceof SVGElement && e.ownerSVGElement && below(e)) return below(e);
     for (; e; e = e.parentElement) {
       const c = parse(getComputedStyle(e).backgroundColor);
       if (c[3] === 1) return c;

@@ -42,6 +42,8 @@ def test_every_text_in_data_for_search_engines_is_escaped_for_a_script() -> None
 # in it. All others join pieces by `format_html_join`, which escapes what is no markup already.
 TRUSTING = {
     "leaderboard/web/markdown.py": ["SafeString(html)"],
+    # A line break between lines that are escaped.
+    "leaderboard/web/formatting.py": ['SafeString("<br>"), "{}", lines))'],
 }
 
 

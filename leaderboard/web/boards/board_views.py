@@ -54,12 +54,12 @@ def render_board(
         ),
         "ladder": ladder,
         "exports": export_views.offers(shown, edition, query),
-        # Where one can submit instead.
+        # Where one can submit instead, and the chart below: of the present board alone.
         "open_splits": []
-        if shown.is_open
+        if shown.is_open or shown.at
         else [each for each in splits_of(request) if admissions.is_open(each, now=now)],
         "profile": None
-        if chart_views.has_progress(shown)
+        if shown.at or chart_views.has_progress(shown)
         else chart_views.profile(shown, n_metrics=1 if ladder else 2),
         "n_profiles": chart_views.N_PROFILES,
         "progress_label": f"{primary} of each method by date, with the lowest {primary} so far.",

@@ -32,7 +32,18 @@ PREFIXES: Final = (
 # All that such views read of an address. What else it names is dropped, such as what a social network adds.
 KNOWN: Final = frozenset(
     {
-        *("at", "sort", "columns", *filters.FILTERS, "page", "intervals", "mine", "limit", "after"),
+        *(
+            "at",
+            "sort",
+            "columns",
+            *filters.FILTERS,
+            "page",
+            "intervals",
+            "mine",
+            "limit",
+            "after",
+            "edition",
+        ),
         *("split", "m", "with"),
     }
 )

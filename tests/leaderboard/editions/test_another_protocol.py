@@ -134,7 +134,7 @@ def test_a_further_range_and_a_third_metric_stand_wherever_their_edition_is_show
     assert "AE s, lower is better; TTC ranges in s: c 0–3, s 3–6, l 6–20, n −20–0, f 20–60" in table
 
     # Method, submission, analysis, receipt.
-    assert "Absolute TTC error" in page_text(client, f"/methods/{far.method_id}/")
+    assert "AE s" in page_text(client, f"/methods/{far.method_id}/")
     api = client_of(owner)
     answer = document(api, f"/api/v1/submissions/{far.pk}")
     assert list(answer["scores"]) == names

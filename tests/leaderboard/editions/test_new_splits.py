@@ -252,7 +252,7 @@ def test_an_archived_split_keeps_its_board_and_takes_no_file(
     change("val", listing="ARCHIVED", position=0)
     with pytest.raises(Refused, match="Submissions to Validation are closed: the split is archived"):
         builders.send(owner, b"{}", split="val")
-    assert "Submissions to Validation are closed: the split is archived." in client.get("/board/val/").text
+    assert "Archived: closed for submissions" in client.get("/board/val/").text
     split_rows = client.get("/api/v1/splits").json()
     assert [each["split"] for each in split_rows] == ["test", "demo", "val"]
     assert (split_rows[-1]["is_open"], split_rows[-1]["is_archived"]) == (False, True)

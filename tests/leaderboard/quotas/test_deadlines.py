@@ -39,7 +39,12 @@ def set_times(kind: str) -> str:
 @pytest.mark.parametrize("kind", [LATE, FUTURE, ENDING])
 def test_board_form_quota_and_api_say_when(edition: Edition, owner: User, client: Client, kind: str) -> None:
     sentence = set_times(kind)
-    assert sentence in pages.page(client.get("/board/test/")).one("main").text
+    label = {
+        LATE: "Closed for submissions since",
+        FUTURE: "Opens for submissions",
+        ENDING: "Open for submissions until",
+    }
+    assert label[kind] in pages.page(client.get("/board/test/")).one("main").text
     client.force_login(owner)
     assert sentence in pages.page(client.get("/submit/")).one("main").text
     if kind != ENDING:
@@ -70,9 +75,13 @@ def test_kept_answers_hear_of_a_time_that_has_come(edition: Edition, client: Cli
     Split.objects.filter(pk="test").update(opens_at=opens_at, closes_at=opens_at + HOUR)
     board_versions.bump_passed_deadlines(now=timezone.now())
     before = board_versions.sum_of_all()
-    assert "open at" in client.get("/board/test/").text
+    assert "Opens for submissions" in client.get("/board/test/").text
     # It has opened; then it has closed; then a maintainer gives more time.
-    for shift, phrase in ((-HOUR / 2, "close at"), (-3 * HOUR, "closed at"), (-HOUR / 2, "close at")):
+    for shift, phrase in (
+        (-HOUR / 2, "Open for submissions until"),
+        (-3 * HOUR, "Closed for submissions"),
+        (-HOUR / 2, "Open for submissions until"),
+    ):
         moment = timezone.now() + shift
         Split.objects.filter(pk="test").update(opens_at=moment, closes_at=moment + HOUR)
         pollers.sweep(rng=random.Random(0))

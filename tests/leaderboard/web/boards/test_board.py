@@ -30,7 +30,9 @@ def row_of(root: pages.Element, name: str) -> pages.Element:
 
 
 def test_columns_are_the_papers_in_its_order(client: Client, benchmark: None) -> None:
-    heads = [head.all("a") for head in get(client).one("thead").all("tr")[1].all("th")]
+    heads = [
+        head.all("a") for head in get(client).one("table", class_="board").one("thead").all("tr")[1].all("th")
+    ]
     named = [link.children[0].text if link.children else link.text for link, *_ in heads]
     assert named == ISSUE_COLUMNS
     assert [link.text for link in heads[METHOD]] == ["Method", "Team", "Date"]
@@ -49,7 +51,7 @@ def test_published_numbers_stand_as_printed(client: Client, benchmark: None) -> 
 
 def test_published_rows_are_marked_and_lead_to_their_citation(client: Client, benchmark: None) -> None:
     root = get(client)
-    for row in root.one("tbody").all("tr"):
+    for row in root.one("table", class_="board").one("tbody").all("tr"):
         tag = row.one("a", class_="tag")
         assert tag.text == "published"
         source = root.one("li", id=tag.attributes["href"].removeprefix("#"))
@@ -104,9 +106,10 @@ def test_anonymous_row_changes_the_time_of_the_board_by_its_day(
     assert updated >= timezone.now(), "the end of the day, so that it rises"
 
 
-def test_caption_of_the_progress_holds_for_any_filter(client: Client, benchmark: None) -> None:
-    section = get(client, "/board/test/?q=shi").one("section", class_="board-progress")
-    assert "All public submissions to Test" in section.text
+def test_chart_below_the_board_holds_for_any_filter(client: Client, benchmark: None) -> None:
+    section = get(client, "/board/test/?q=nerf").one("section", class_="board-progress")
+    assert "The first 5 rows of the board" in section.text
+    assert "Pixel MSE" in section.text
 
 
 def test_demo_says_that_its_truth_is_simulated(client: Client, tmp_path: Path, benchmark: None) -> None:
@@ -142,7 +145,10 @@ def test_my_teams_rows_are_marked_and_its_private_ones_stand_on_its_own_board_al
     for user in (owner, teammate, stranger):
         client.force_login(user)
         root = get(client)
-        seen[user.name] = "mine" in row_of(root, "Foo").classes, "private" in root.one("tbody").text
+        seen[user.name] = (
+            "mine" in row_of(root, "Foo").classes,
+            "private" in root.one("table", class_="board").one("tbody").text,
+        )
     assert seen == {"Owls": (True, True), "Mate": (True, True), "Strangers": (False, False)}
 
 
