@@ -64,7 +64,7 @@ def test_four_estimators_in_both_forms_through_both_doors_score_as_in_the_toolki
     people: Callable[[Site], Visitor],
     programs: Callable[[Site, str], Program],
 ) -> None:
-    site.manage("import_truth", "val", str(kitti / "truth.csv"))
+    site.manage("import_truth", "val", str(kitti / "truth.csv"), "--protocol", "tsttc-1")
     person = people(site)
     person.sign_up(email=EMAIL, name="Driving school")
     program = programs(site, EMAIL)
