@@ -210,6 +210,7 @@ def _report(done: Run, *, out: Path, as_json: bool) -> None:
                 "output": str(out),
                 "n_sequences": n_sequences,
                 "n_resumed": done.n_resumed,
+                "seconds": round(done.seconds, 3),
                 **done.meta,
                 "examples": {reason: str(problem) for reason, problem in done.examples.items()},
             }
