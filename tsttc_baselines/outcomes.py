@@ -14,6 +14,7 @@ from tsttc_baselines.estimates import Estimate, Estimator, SequenceFault, Unusab
 from tsttc_baselines.folders import SequenceFolder
 from tsttc_baselines.images import ImageCache
 from tsttc_baselines.methods import Method, Value
+from tsttc_baselines.own_methods import line_of
 from tsttc_baselines.sequence_checks import box_frames, require_boxes, require_sizes
 
 NO_SCALE_CHANGE: Final = 1.0
@@ -45,23 +46,24 @@ class SequenceEstimator:
         """Estimate one row, by a fallback if necessary."""
         try:
             estimate = self._estimate(row)
+            value = float(estimate.scale_ratio)
         except SequenceFault as fault:
             return self._fallback(row, str(fault), fault.problem)
         except Unusable as fault:
             return self._fallback(row, str(fault), self._problem(row, f"{fault}; expected an estimate"))
         except Exception as error:  # noqa: BLE001 -- one sequence must not end a run of hours; it is counted
             reason = f"the method failed with {type(error).__name__}"
+            cause = f"{error}{line_of(error, self.method.factory)}"
             return self._fallback(
-                row, reason, self._problem(row, f"{reason} ({error}); expected an estimate")
+                row, reason, self._problem(row, f"{reason} ({cause}); expected an estimate")
             )
-        value = estimate.scale_ratio
         if not 0 < value < math.inf:
             problem = self._problem(row, f"the estimate is {value}; expected a finite number greater than 0")
             return self._fallback(row, "estimate is not a positive number", problem)
         if estimate.fallback is None:
-            return Outcome(row, float(value))
+            return Outcome(row, value)
         problem = self._problem(row, f"{estimate.fallback}; expected an estimate of the method itself")
-        return Outcome(row, float(value), estimate.fallback, problem)
+        return Outcome(row, value, estimate.fallback, problem)
 
     def _estimate(self, row: int) -> Estimate:
         frames = box_frames(self.method, self.frame_gap)
@@ -70,7 +72,10 @@ class SequenceEstimator:
         clip = self.folder.clip(row, cache=self._cache, with_images=with_images)
         image_px = self.folder.size(row, cache=self._cache) if with_images else None
         require_sizes(self.folder, clip, row, frames, image_px=image_px)
-        return self._estimator(clip, frame_gap=self.frame_gap)
+        estimate: object = self._estimator(clip, frame_gap=self.frame_gap)
+        if not isinstance(estimate, Estimate):  # as a method of another package may do
+            raise TypeError(f"it returned a {type(estimate).__name__}, not an Estimate")
+        return estimate
 
     def _fallback(self, row: int, reason: str, problem: Problem) -> Outcome:
         boxes = self.folder.boxes[row]

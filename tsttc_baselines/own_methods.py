@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import sys
+import traceback
 from dataclasses import replace
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -69,7 +70,7 @@ def _loaded(factory: str, *, name: str) -> Method:
         summary = (inspect.getdoc(named) or "A method without a docstring.").splitlines()[0]
         parameters = tuple(map(_parameter, _keywords(named)))
     except Exception as error:  # noqa: BLE001 -- a foreign module may fail at anything
-        cause = f"{type(error).__name__}: {error}"
+        cause = f"{type(error).__name__}: {error}{line_of(error, factory)}"
         raise MethodMissing(f"The method {name} cannot be loaded ({cause}).") from None
     return Method(name, attribute, summary, factory, parameters)
 
@@ -91,9 +92,23 @@ def _parameter(keyword: inspect.Parameter) -> Parameter:
     return Parameter(keyword.name, default, f"Of {named or 'any type'}.", kind, is_required=is_required)
 
 
+def line_of(error: BaseException, factory: str) -> str:
+    """The last line of the method's package that an error passed, as ", line 8 of net.py", else nothing."""
+    lines = [
+        f", line {number} of {Path(frame.f_code.co_filename).name}"
+        for frame, number in traceback.walk_tb(error.__traceback__)
+        if _package(str(frame.f_globals.get("__name__"))) == _package(factory)
+    ]
+    return lines[-1] if lines else ""
+
+
+def _package(name: str) -> str:
+    return name.partition(":")[0].partition(".")[0]
+
+
 def code_of(method: Method) -> dict[str, str]:
     """The factory, and the SHA-256 of the Python files of its package, which say what ran."""
-    top = import_module(method.factory.partition(".")[0].partition(":")[0])
+    top = import_module(_package(method.factory))
     folders = [Path(folder) for folder in getattr(top, "__path__", ())]
     files = sorted(file for folder in folders for file in folder.rglob("*.py")) or [Path(str(top.__file__))]
     digest = hashlib.sha256()

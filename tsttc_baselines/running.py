@@ -129,12 +129,11 @@ def _done(
         if outcome.reason and outcome.problem:
             examples.setdefault(outcome.reason, outcome.problem)
     weights = _weights(parameters)
-    meta = {
+    meta = {  # without a duration or date: the same estimates are the same bytes, and so one submission
         "method": method.name,
         "version": tsttc_version(),
         "provenance": method.provenance(parameters, digests=weights.get("weights")),
         "parameters": _plain(parameters),
-        "seconds": round(seconds, 3),
         "n_fallback": _shortened(n_fallback),
         "opencv": cv2.__version__,
         **weights,

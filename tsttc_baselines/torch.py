@@ -4,7 +4,7 @@
     for batch in DataLoader(crops, batch_size=32, shuffle=True, num_workers=2):
         ratio = batch["box_ratio"] * network(batch["crops"]).exp()
 
-Needs torch.
+Needs torch and OpenCV.
 """
 
 from __future__ import annotations
@@ -14,9 +14,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+try:
+    import cv2
+    import torch
+    from torch.utils.data import Dataset
+except ModuleNotFoundError as missing:
+    packages = "torch opencv-python-headless"
+    message = f"tsttc_baselines.torch needs {missing.name}; install it with: pip install {packages}"
+    raise ModuleNotFoundError(message, name=missing.name) from None
 
 from tsttc_baselines.boxes import Floats, centre_of, size_of
 from tsttc_baselines.clips import TARGET, Clip, Image
@@ -24,13 +32,6 @@ from tsttc_baselines.detection import scale_ratio_of_two
 from tsttc_baselines.estimates import Unusable
 from tsttc_baselines.pairs import FRAME_GAP, FolderSequences, Source, augmented, usable_pair
 from tsttc_baselines.patches import boxes_of_pair, cut, require_centre_inside
-
-try:
-    import torch
-    from torch.utils.data import Dataset
-except ModuleNotFoundError as missing:
-    message = f"tsttc_baselines.torch needs {missing.name}; install it with: pip install torch"
-    raise ModuleNotFoundError(message, name=missing.name) from None
 
 CONTEXT: Final = 1.2
 """The side of a crop, as a multiple of the root of its box's area."""

@@ -14,6 +14,7 @@ from tests.tsttc_baselines.made_folders import made_folder
 CODE = '''
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from tsttc_baselines.estimates import Estimate
@@ -29,6 +30,18 @@ class Widths:
     def __call__(self, clip, *, frame_gap):
         widths = [clip.boxes[frame][2] - clip.boxes[frame][0] for frame in (5 - frame_gap, 5)]
         return Estimate(self.factor * (widths[0] / widths[1]) ** self.used["power"])
+
+
+class Slip:
+    """Three slips, which leave the method at different places."""
+
+    def __init__(self, *, at: str) -> None:
+        self.at = at
+        if at == "start":
+            {}["weights"]
+
+    def __call__(self, clip, *, frame_gap):
+        return 0.97 if self.at == "end" else json.loads("x")
 
 
 broken = 3
@@ -122,6 +135,10 @@ def test_an_installed_package_has_its_method_in_the_list(here: Path) -> None:
             run("mine.net:Widths", "--set", "weights=frames/boxes.csv"),
             "Error: could not convert string to float: ",
         ),
+        (
+            run("mine.net:Slip", "--set", "at=start"),
+            "The method mine.net:Slip cannot be made (KeyError: 'weights', line 28 of net.py).",
+        ),
         (run("mine.net:None"), "The method mine.net:None cannot be loaded (AttributeError: "),
         (run("mine.net:broken"), "cannot be loaded (TypeError: broken is neither a class nor a Method)."),
         (run("nothing"), "There is no method 'nothing'; expected detection, pixel-mse, "),
@@ -132,4 +149,18 @@ def test_what_cannot_run_is_named_at_once(here: Path, words: tuple[str, ...], me
     done = tsttc(here, *words)
     assert done.returncode == 2, done.stderr
     assert message in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("at", "cause"),
+    [
+        ("end", "TypeError (it returned a float, not an Estimate)"),
+        ("call", "JSONDecodeError (Expecting value: line 1 column 1 (char 0), line 31 of net.py)"),
+    ],
+)
+def test_a_slip_in_the_method_is_named_with_its_line(here: Path, at: str, cause: str) -> None:
+    done = tsttc(here, *run("mine.net:Slip", "--set", f"at={at}"))
+    assert done.returncode == 1, done.stderr
+    assert f"20 of them for this reason: The method failed with {cause}; expected an estimate." in done.stderr
     assert "Traceback" not in done.stderr

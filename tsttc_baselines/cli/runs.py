@@ -18,7 +18,7 @@ from evaluator.counting import counted
 from tsttc_baselines.cli import require_opencv
 from tsttc_baselines.cli.options import gap_option, jobs_option, out_option, require_writable
 from tsttc_baselines.methods import METHODS, Method, Parameter, Value
-from tsttc_baselines.own_methods import MethodMissing, find_method, is_own
+from tsttc_baselines.own_methods import MethodMissing, find_method, is_own, line_of
 
 if TYPE_CHECKING:
     from tsttc_baselines.running import Run
@@ -197,7 +197,7 @@ def _require_estimator(method: Method, given: Mapping[str, Value]) -> None:
     except Exception as error:
         if not is_own(method):
             raise
-        cause = printable(f"{type(error).__name__}: {error}")
+        cause = printable(f"{type(error).__name__}: {error}{line_of(error, method.factory)}")
         raise click.UsageError(f"The method {method.name} cannot be made ({cause}).") from None
 
 
@@ -210,6 +210,7 @@ def _report(done: Run, *, out: Path, as_json: bool) -> None:
                 "output": str(out),
                 "n_sequences": n_sequences,
                 "n_resumed": done.n_resumed,
+                "seconds": round(done.seconds, 3),
                 **done.meta,
                 "examples": {reason: str(problem) for reason, problem in done.examples.items()},
             }
