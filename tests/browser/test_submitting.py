@@ -263,7 +263,7 @@ def test_state_moves_without_a_reload(page: Page, site: Site, truth: evaluator.G
         await_step(page, "Scored")
         expect(page.locator(".result table")).to_have_count(1)
         expect(page.locator("#outcome")).to_contain_text("truncated")
-        expect(page.locator(".result .span").first).to_contain_text("–")
+        expect(page.locator(".result td.span").first).to_contain_text("–")
     expect(page.locator("[aria-current=step]")).not_to_have_class(re.compile("moving"))
     assert page.evaluate("window.isTheSamePage") is True
 
