@@ -54,7 +54,7 @@ def error_analysis_tables(closer: Analysis, best: Reference | None) -> dict[str,
         "primary": rules.primary.symbol,
         "errors": errors,
         "quantiles": [
-            (f"{100 * row[0]['quantile']:.0f} %", [format_rounded(each["value"]) for each in row])
+            (f"{100 * row[0]['quantile']:.0f}%", [format_rounded(each["value"]) for each in row])
             for row in quantiles
         ],
         "scatter": scatter(content["scatter"]),

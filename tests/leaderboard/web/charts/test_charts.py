@@ -50,8 +50,8 @@ def test_every_chart_has_its_options_and_the_table_with_the_same_numbers(
     builders.infer_all()
     root = get(client, "/board/test/charts/")
     assert [figure.attributes["data-chart"] for figure in root.all("figure")] == [
-        "progress",
         "profile",
+        "progress",
         "latency",
         "significance",
     ]
@@ -111,7 +111,7 @@ def test_a_progress_has_three_dates_and_else_errors_by_range_are_drawn(
     assert below("/board/test/") == [("progress", False)]
     # Its data are on another page: without scripts there is no heading over an empty area.
     assert get(client, "/board/test/").all("section", class_="drawn-only")
-    assert below("/board/test/charts/")[0] == ("progress", True)
+    assert ("progress", True) in below("/board/test/charts/")
 
 
 def test_below_a_board_the_chart_does_not_change_with_its_filters(
