@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import pytest
 from django.test import Client
@@ -200,3 +201,12 @@ def test_what_was_chosen_of_several_submissions_is_shown_and_what_that_is_worth(
     assert method_page.one("p", class_="selection").text == sentence
     other = pages.page(client.get(f"/methods/{ids[1]}/"))
     assert other.all("p", class_="selection") == []
+
+
+def test_choice_opens_on_the_first_split_whose_submissions_are_scored(
+    client: Client, benchmark: None, tmp_path: Path
+) -> None:
+    assert "No method has a score on test yet." in words(pages.page(client.get("/compare/")))
+    builders.import_truth(tmp_path, split="val")
+    builders.board_changed("val")
+    assert "No method has a score on val yet." in words(pages.page(client.get("/compare/")))
