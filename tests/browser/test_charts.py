@@ -95,10 +95,11 @@ def test_names_at_the_front_do_not_overlap(new_page: NewPage, board: None) -> No
         page.goto(CHARTS)
         for kind in ("progress", "latency"):
             figure = drawn(page, kind)
-            boxes = figure.evaluate(NAMES)
-            assert boxes
             frame = figure.locator(".drawing").bounding_box()
             assert frame is not None
+            # A name without room is put aside, to the left of the drawing.
+            boxes = [box for box in figure.evaluate(NAMES) if box[2] > frame["x"]]
+            assert boxes
             assert all(frame["x"] <= box[0] and box[2] <= frame["x"] + frame["width"] for box in boxes)
             assert [1 for i, a in enumerate(boxes) for b in boxes[:i] if overlaps(a, b)] == []
 

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+from importlib.metadata import entry_points
 from pathlib import Path
 
 from evaluator import TTC_RANGES, evaluate, read_predictions, read_truth
@@ -105,9 +106,12 @@ def test_lines_of_the_pages_about_python_and_models_run_in_a_copy_of_the_example
 
 
 def test_page_names_commands_options_and_exit_codes_that_there_are() -> None:
-    shown = re.findall(r"`tsttc ([a-z]+)|^tsttc ([a-z]+)", PAGE, re.MULTILINE)
-    assert {first or second for first, second in shown} <= set(own_commands())
-    known = {flag for command in own_commands().values() for option in command.params for flag in option.opts}
+    shown = re.findall(r"`tsttc ([a-z-]+)|^tsttc ([a-z-]+)", PAGE, re.MULTILINE)
+    others = {entry.name: entry.load() for entry in entry_points(group="tsttc.commands")}
+    assert {first or second for first, second in shown} <= own_commands().keys() | others.keys()
+    groups = [getattr(command, "commands", {"": command}) for command in others.values()]
+    commands = [*own_commands().values(), *(command for group in groups for command in group.values())]
+    known = {flag for command in commands for option in command.params for flag in option.opts}
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", PAGE)) - {"--fail-with-body"} <= known
     codes = {int(code) for code in re.findall(r"[Cc]ode (\d)", PAGE)}
     assert codes <= {code.value for code in Exit}
