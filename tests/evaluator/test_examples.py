@@ -10,6 +10,8 @@ import sys
 from importlib.metadata import entry_points
 from pathlib import Path
 
+import click
+
 from evaluator import TTC_RANGES, evaluate, read_predictions, read_truth
 from evaluator.cli import own_commands
 from evaluator.cli.exits import Exit
@@ -105,12 +107,23 @@ def test_lines_of_the_pages_about_python_and_models_run_in_a_copy_of_the_example
     assert hashlib.sha256(OWN_WEIGHTS.read_bytes()).hexdigest() in MODELS
 
 
+def parts_of(command: click.Command) -> list[click.Command]:
+    """The commands of a group, or the command itself."""
+    if not isinstance(command, click.Group):
+        return [command]
+    context = click.Context(command)
+    parts = (command.get_command(context, name) for name in command.list_commands(context))
+    return [part for part in parts if part is not None]
+
+
 def test_page_names_commands_options_and_exit_codes_that_there_are() -> None:
     shown = re.findall(r"`tsttc ([a-z-]+)|^tsttc ([a-z-]+)", PAGE, re.MULTILINE)
     others = {entry.name: entry.load() for entry in entry_points(group="tsttc.commands")}
     assert {first or second for first, second in shown} <= own_commands().keys() | others.keys()
-    groups = [getattr(command, "commands", {"": command}) for command in others.values()]
-    commands = [*own_commands().values(), *(command for group in groups for command in group.values())]
+    commands = [
+        *own_commands().values(),
+        *(each for command in others.values() for each in parts_of(command)),
+    ]
     known = {flag for command in commands for option in command.params for flag in option.opts}
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", PAGE)) - {"--fail-with-body"} <= known
     codes = {int(code) for code in re.findall(r"[Cc]ode (\d)", PAGE)}
