@@ -9,7 +9,7 @@ from playwright.sync_api import Locator, Page, expect
 
 from tests.browser.chromium import MOVED, NARROW, OVERFLOW_PX, WIDE
 from tests.browser.conftest import N_SHOWN, NewPage
-from tests.browser.inspection import AXE, TRANSFERRED, axe, in_colours
+from tests.browser.inspection import AXE, SETTLED, TRANSFERRED, axe, in_colours
 
 pytestmark = pytest.mark.browser
 
@@ -57,6 +57,18 @@ def rows(figure: Locator, name: int, value: int) -> set[tuple[str, str]]:
         "rows => rows.map(row => [...row.cells].map(cell => cell.textContent.trim()))"
     )
     return {(row[name], row[value]) for row in texts}
+
+
+def show_last(page: Page, figure: Locator) -> None:
+    """Show the card of the last mark, again where a busy browser has resized the chart meanwhile."""
+    card = figure.locator(".card")
+    figure.locator(".drawing").focus()
+    for _ in range(5):
+        page.keyboard.press("End")
+        page.evaluate(SETTLED)
+        if card.is_visible():
+            break
+    expect(card).to_be_visible()
 
 
 @pytest.mark.parametrize(("viewport", "scheme"), [(WIDE, "light"), (NARROW, "dark")])
@@ -171,7 +183,5 @@ def test_what_a_mark_says_can_be_read_in_the_light_and_in_the_dark(page: Page, b
     page.evaluate(AXE)
     for scheme in ("light", "dark"):
         in_colours(page, scheme)
-        page.mouse.move(0, 0)  # a chart that is drawn anew shows no card until the pointer moves
-        page.mouse.move(*figure.evaluate(MIDDLES)[-1])
-        expect(figure.locator(".card")).to_be_visible()
+        show_last(page, figure)
         assert list(axe(page, where=scheme)) == []
