@@ -5,11 +5,10 @@ A list in the folder has the digest of every other file, so damage is found with
 
 from __future__ import annotations
 
-import hashlib
 import json
-from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from evaluator.problems import Problem, Rejected
 from evaluator.receipts import NotVerified, read_keys, verify
@@ -20,8 +19,7 @@ RECEIPTS: Final = "receipts"
 FORMAT: Final = 1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Archive:
+class Archive(NamedTuple):
     """What an archive says of itself, and what is wrong with it. `digest` is that of the list: quote it."""
 
     site: str
@@ -35,7 +33,9 @@ class Archive:
 
 def write_list(folder: Path, *, site: str, made_at: str) -> None:
     """List the files of a folder, which is an archive from this moment on."""
-    document = {"format": FORMAT, "site": site, "made_at": made_at, "files": _digests(folder)}
+    files = _digests(folder)
+    files.pop(LIST, None)
+    document = {"format": FORMAT, "site": site, "made_at": made_at, "files": files}
     (folder / LIST).write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
@@ -44,32 +44,31 @@ def check(folder: Path, *, keys: bytes | None = None) -> Archive:
 
     Raises `Rejected` for a folder without a list that can be read, and `OSError`.
     """
-    listed, there = _list(folder), _digests(folder)
-    files: dict[str, str] = listed["files"]
-    receipts = sorted(name for name in there if name.startswith(f"{RECEIPTS}/"))
+    (files, site, made_at), there = _list(folder), _digests(folder)
+    digest = there.pop(LIST)
+    receipts = [name for name in there if name.startswith(f"{RECEIPTS}/")]
     problems = [
         Problem(code, f"The file is {code}; expected what {LIST} has.", name)
         for name in sorted({*files, *there})
         if files.get(name) != there.get(name)
         for code in ["missing" if name not in there else "changed" if name in files else "additional"]
     ]
-    where = KEYS if keys is None else "--keys"
+    source = KEYS if keys is None else "--keys"
     if keys is None:
         keys = (folder / KEYS).read_bytes() if KEYS in there else b""
-    try:
-        known = read_keys(keys)
-        for where in receipts:
-            try:
+    known: dict[str, Any] = {}
+    for where in [source, *receipts]:
+        try:
+            if where == source:
+                known = read_keys(keys)
+            elif known:
                 verify((folder / where).read_bytes(), known)
-            except NotVerified as fault:
-                problems.append(Problem(fault.code, str(fault), where))
-    except NotVerified as fault:
-        known = {}
-        problems.append(Problem(fault.code, str(fault), where))
+        except NotVerified as fault:
+            problems.append(Problem(fault.code, str(fault), where))
     return Archive(
-        site=str(listed["site"]),
-        made_at=str(listed["made_at"]),
-        digest=_digest(folder / LIST),
+        site=site,
+        made_at=made_at,
+        digest=digest,
         n_files=len(files),
         n_receipts=len(receipts),
         key_ids=tuple(known),
@@ -77,22 +76,17 @@ def check(folder: Path, *, keys: bytes | None = None) -> Archive:
     )
 
 
-def _list(folder: Path) -> dict[str, Any]:
+def _list(folder: Path) -> tuple[dict[str, str], str, str]:
     try:
-        document: dict[str, Any] = json.loads((folder / LIST).read_bytes())
-        if document["format"] == FORMAT and document["files"].keys() and document["site"]:
-            return document
-    except (FileNotFoundError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        document = json.loads((folder / LIST).read_bytes())
+        if document["format"] == FORMAT and document["files"]:
+            return dict(document["files"]), str(document["site"]), str(document["made_at"])
+    except (FileNotFoundError, ValueError, LookupError, TypeError, RecursionError):
         pass
     message = f"The folder has no {LIST} of the format {FORMAT}, or a damaged one; expected an archive."
     raise Rejected([Problem("unreadable", message)])
 
 
 def _digests(folder: Path) -> dict[str, str]:
-    paths = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*")}
-    return {name: _digest(path) for name, path in sorted(paths.items()) if path.is_file() and name != LIST}
-
-
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return f"sha256:{hashlib.file_digest(file, 'sha256').hexdigest()}"
+    paths = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
+    return {name: f"sha256:{sha256(paths[name].read_bytes()).hexdigest()}" for name in sorted(paths)}

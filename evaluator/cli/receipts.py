@@ -112,7 +112,7 @@ def _verify_archive(folder: Path, *, keys: bytes | None, as_json: bool) -> None:
         raise click.BadParameter(f"{error.filename} cannot be read: {error.strerror}.") from None
     if archive.problems:
         raise rejected(str(folder), Rejected(archive.problems))
-    facts = {name: getattr(archive, name) for name in archive.__dataclass_fields__}
+    facts = archive._asdict()
     if as_json:
         echo_json(facts)
         return

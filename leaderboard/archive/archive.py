@@ -4,6 +4,7 @@ What is in it is what everybody sees, at one moment: an anonymous method has its
 """
 
 import json
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Final
@@ -19,20 +20,15 @@ from leaderboard.api.serializers import BoardSerializer, absolute
 from leaderboard.backups import contents, database
 from leaderboard.backups.contents import NoBackup
 from leaderboard.boards import listing, snapshots
-from leaderboard.boards.rows import Entry
 from leaderboard.exports import tables
 from leaderboard.models import Edition, Split, Submission, Visibility
 from leaderboard.pages import texts
 from leaderboard.storage import files
 from leaderboard.submissions import receipts
 
-_ROOT: Final = Path(settings.BASE_DIR)
 _COPIED: Final = ("CHANGELOG.md", "docs/**/*.md", "docs/**/*.svg")
-_STYLES: Final = (_ROOT / "static" / "site.css", Path(__file__).with_name("index.css"))
 # The other pages of a site name persons, or are about the server.
 _PAGES: Final = ("rules", "licence")
-
-Files = dict[str, bytes]
 
 
 def make(*, into: str, now: datetime) -> Path:
@@ -41,13 +37,14 @@ def make(*, into: str, now: datetime) -> Path:
     folder = contents.folder_of(into)
     for path in [folder] if folder.is_file() else folder.glob("*"):
         raise NoBackup(f"There is {path}; expected an empty or a new folder.")
+    papers = published.printed_tables() if settings.BENCHMARK.has_paper_tables else ()
     with database.one_moment():
-        written, boards = _texts(now), []
+        written, boards = _texts(papers, now), []
         for split in snapshots.splits():
             editions = snapshots.editions().filter(split=split).order_by("-number")
             boards += [_board(split, edition, written) for edition in editions or [None]]
-    context = {"boards": boards, "now": now, "benchmark": settings.BENCHMARK, "site_url": settings.SITE_URL}
-    context |= {"papers": _papers(), "site_pages": _PAGES}
+    context = {"boards": boards, "papers": papers, "site_pages": _PAGES, "now": now}
+    context |= {"benchmark": settings.BENCHMARK, "site_url": settings.SITE_URL}
     written["index.html"] = render_to_string("archive/index.html", context).encode()
     for name, data in written.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -56,7 +53,7 @@ def make(*, into: str, now: datetime) -> Path:
     return folder
 
 
-def _board(split: Split, edition: Edition | None, written: Files) -> dict[str, Any]:
+def _board(split: Split, edition: Edition | None, written: dict[str, bytes]) -> dict[str, Any]:
     """Add the files of a board to `written`, and return what the index shows of it. Raises `OSError`."""
     board = listing.board(split=split, edition=edition, viewer=AnonymousUser())
     address = absolute("edition", split.pk, edition.number) if edition else absolute("board", split.pk)
@@ -72,8 +69,14 @@ def _board(split: Split, edition: Edition | None, written: Files) -> dict[str, A
         with files.store().open(links["Manifest"], "rb") as file:
             written[links["Manifest"]] = file.read()
     export = tables.export(board, address=address, has_intervals=True)
-    shown = [entry for entry in board.entries if entry.withdrawn_at is None]
-    scored = [_receipt(entry, edition, written) for entry in shown]
+    shown, rows = [entry for entry in board.entries if entry.withdrawn_at is None], []
+    for row, entry in zip(export.rows, shown, strict=True):
+        name = ""
+        if edition and entry.submission_id and entry.visibility == Visibility.PUBLIC:
+            name = f"{archives.RECEIPTS}/{entry.submission_id}-edition-{edition.number}.jwt"
+            submission = Submission.objects.select_related("method").get(pk=entry.submission_id)
+            written[name] = receipts.receipt(submission=submission, edition_number=edition.number).encode()
+        rows.append((row, entry, name))
     return {
         "split": split,
         "edition": edition,
@@ -81,56 +84,39 @@ def _board(split: Split, edition: Edition | None, written: Files) -> dict[str, A
         "links": links,
         "groups": [(metric.heading, len(names)) for metric, names in grouped_names(export.scores).items()],
         "ranges": [range_of(name) for name in export.scores],
-        "rows": list(zip(export.rows, shown, scored, strict=True)),
+        "rows": rows,
         "has_intervals": any(entry.intervals for entry in shown),
     }
 
 
-def _receipt(entry: Entry, edition: Edition | None, written: Files) -> str:
-    """Add the receipt of a row under its own name. Returns its path; empty where there is none."""
-    if edition is None or entry.submission_id is None or entry.visibility != Visibility.PUBLIC:
-        return ""
-    submission = Submission.objects.select_related("method").get(pk=entry.submission_id)
-    name = f"{archives.RECEIPTS}/{submission.pk}-edition-{edition.number}.jwt"
-    written[name] = receipts.receipt(submission=submission, edition_number=edition.number).encode()
-    return name
-
-
-def _texts(now: datetime) -> Files:
+def _texts(papers: Sequence[published.PrintedTable], now: datetime) -> dict[str, bytes]:
     """Return keys of receipts, metadata for Zenodo, tables of the paper, pages, docs and styles."""
-    written = {archives.KEYS: _json(receipts.public_keys()), ".zenodo.json": _json(_zenodo(now))}
-    for table in _papers():
+    benchmark, root = settings.BENCHMARK, Path(settings.BASE_DIR)
+    # Maintainers complete creators and licence.
+    deposit = {
+        "title": f"{benchmark.site_name}: boards of {now:%Y-%m-%d}",
+        "description": f"<p>The public boards of {settings.SITE_URL}, with manifests, signed receipts and "
+        "documents. index.html shows them; pages/licence.md says what others may do with them.</p>",
+        "upload_type": "dataset",
+        "creators": [{"name": benchmark.site_name}],
+        "publication_date": f"{now:%Y-%m-%d}",
+        "license": "other-open",
+        "keywords": list(benchmark.keywords),
+        "related_identifiers": [
+            {"identifier": benchmark.dataset.url, "relation": "isSupplementTo"},
+            {"identifier": settings.SITE_URL, "relation": "isDerivedFrom"},
+        ],
+    }
+    written = {archives.KEYS: _json(receipts.public_keys()), ".zenodo.json": _json(deposit)}
+    for table in papers:
         written[f"paper/{table.table.name}.csv"] = published.as_csv(table).encode()
         written[f"paper/{table.table.name}.tex"] = published.as_latex(table).encode()
     for name in _PAGES:
         edited = texts.current(name)
         written[f"pages/{name}.md"] = (edited.text if edited else texts.default_text(name)).encode()
-    for path in sorted(path for pattern in _COPIED for path in _ROOT.glob(pattern)):
-        written[path.relative_to(_ROOT).as_posix()] = path.read_bytes()
-    return written | {path.name: path.read_bytes() for path in _STYLES}
-
-
-def _papers() -> tuple[published.PrintedTable, ...]:
-    return published.printed_tables() if settings.BENCHMARK.has_paper_tables else ()
-
-
-def _zenodo(now: datetime) -> dict[str, Any]:
-    """Return the metadata of a deposit, for `.zenodo.json`; maintainers complete creators and licence."""
-    return {
-        "title": f"{settings.BENCHMARK.site_name}: boards of {now:%Y-%m-%d}",
-        "description": f"<p>The public boards of {settings.SITE_URL}, with manifests, signed receipts and "
-        "documents. index.html shows them; pages/licence.md says what others may do with them.</p>",
-        "upload_type": "dataset",
-        "creators": [{"name": settings.BENCHMARK.site_name}],
-        "publication_date": f"{now:%Y-%m-%d}",
-        "access_right": "open",
-        "license": "other-open",
-        "keywords": list(settings.BENCHMARK.keywords),
-        "related_identifiers": [
-            {"identifier": settings.BENCHMARK.dataset.url, "relation": "isSupplementTo"},
-            {"identifier": settings.SITE_URL, "relation": "isDerivedFrom"},
-        ],
-    }
+    copied = {path.relative_to(root).as_posix(): path for each in _COPIED for path in root.glob(each)}
+    copied |= {"site.css": root / "static/site.css", "index.css": Path(__file__).with_name("index.css")}
+    return written | {name: path.read_bytes() for name, path in copied.items()}
 
 
 def _json(document: object) -> bytes:

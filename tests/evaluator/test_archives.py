@@ -84,7 +84,11 @@ def test_receipts_are_not_taken_as_valid_without_keys(folder: Path, keys: bytes 
 
 
 @pytest.mark.parametrize(
-    "text", [None, "{", "[]", '{"format": 1, "files": 3}', "[" * 100_000, '{"format": 9}']
+    "text",
+    [
+        *(None, "{", "[]", "[" * 100_000, '{"format": 9}', '{"format": 1, "files": 3}'),
+        '{"format": 1, "files": {"a": "b"}, "site": "https://example.org"}',
+    ],
 )
 def test_a_folder_without_a_sound_list_is_no_archive(folder: Path, text: str | None) -> None:
     (folder / archives.LIST).unlink()

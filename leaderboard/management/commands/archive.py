@@ -13,20 +13,16 @@ from leaderboard.backups.contents import NoBackup
 
 
 class Command(BaseCommand):
-    """Writes everything that is public about results into a folder that needs no server."""
-
     help = "Write the public boards, manifests, receipts and docs into an empty folder, to be kept elsewhere."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Where to."""
         parser.add_argument("folder", metavar="FOLDER", help="an empty folder, or a new one")
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Make it, and say what it holds."""
         try:
             made = archives.check(archive.make(into=options["folder"], now=timezone.now()))
         except (NoBackup, OSError, DatabaseProblem) as fault:
             raise CommandError(f"Nothing was archived. {fault}") from fault
         self.stdout.write(
-            f"Archived {made.n_files:,} files with {made.n_receipts:,} receipts. List: {made.digest}"
+            f"Archived {made.n_files:,} files, {made.n_receipts:,} receipts. List: {made.digest}"
         )
