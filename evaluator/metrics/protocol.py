@@ -180,10 +180,7 @@ def _contradictions(protocol: Protocol) -> Iterator[str]:
         )
     for ttc_range in protocol.ranges:
         if not ttc_range.low_s < ttc_range.high_s:
-            yield (
-                f"the TTC range {ttc_range.name!r} begins at {ttc_range.low_s:g} s and ends at "
-                f"{ttc_range.high_s:g} s; expected a later end"
-            )
+            yield f"the TTC range {ttc_range.name!r} is {ttc_range.seconds}; expected a later end"
     yield from _faulty_names(protocol)
 
 
@@ -191,16 +188,13 @@ def _faulty_names(protocol: Protocol) -> Iterator[str]:
     """Names that scores cannot have, and what has the name, symbol or letter of something else."""
     metrics = [(f"metric {each.symbol}", each.name) for each in protocol.metrics]
     ranges = [(f"TTC range {each.seconds}", each.name) for each in protocol.ranges]
-    for what, name in (*metrics, *ranges):
+    for what, name in metrics + ranges:
         if not _NAME.fullmatch(name) or name == OVERALL:
             yield f"the {what} is called {name!r}; expected lower-case letters and digits, not {OVERALL!r}"
     symbols = [(f"metric {each.name}", each.symbol) for each in protocol.metrics]
     letters = [(f"TTC range {each.name} ({each.seconds})", each.name[:1]) for each in protocol.ranges]
-    for kind, named in (
-        ("are called", [*metrics, *ranges]),
-        ("are called", symbols),
-        ("begin with the letter", letters),
-    ):
+    names = [("are called", metrics + ranges), ("are called", symbols), ("begin with the letter", letters)]
+    for kind, named in names:
         for (one, name), (other, same) in itertools.combinations(named, 2):
             if name == same:
                 yield f"the {one} and the {other} both {kind} {name!r}; expected different ones"

@@ -120,7 +120,7 @@ def _relative_ttc_error(terms: Terms) -> Floats:
     return error
 
 
-def is_warning(ttc_s: Floats, *, threshold_s: float) -> NDArray[np.bool_]:
+def is_warning(ttc_s: Floats, *, threshold_s: float | Floats) -> NDArray[np.bool_]:
     """Whether a collision warning is due at each of these times: 0 < τ ≤ threshold."""
     return (ttc_s > 0.0) & (ttc_s <= threshold_s)
 

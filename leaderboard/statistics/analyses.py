@@ -143,7 +143,7 @@ def content_of(
     rng = np.random.default_rng(0)
     drawn = np.sort(rng.permutation(truth.n_sequences)[:MAX_POINTS])
     predicted_s = report.details.predicted_ttc_s[drawn]
-    return {
+    content = {
         "n_sequences": truth.n_sequences,
         "n_recordings": truth.manifest.n_recordings,
         "curve": _curve(truth, errors, decimals, unit),
@@ -160,12 +160,10 @@ def content_of(
             "predicted_s": np.round(predicted_s, 3).tolist(),
         },
         "worst": _worst(truth, errors, decimals, by=rules.primary.name),
-        **(
-            {"warnings": _warnings(truth, report.details.predicted_ttc_s, decimals, unit)}
-            if WARNING in rules.metrics
-            else {}
-        ),
     }
+    if WARNING in rules.metrics:
+        content["warnings"] = _warnings(truth, report.details.predicted_ttc_s, decimals, unit)
+    return content
 
 
 def _curve(
@@ -211,31 +209,25 @@ def _warnings(
     truth: evaluator.GroundTruth, predicted_ttc_s: Floats, decimals: int, unit: str | None
 ) -> list[dict[str, Any]]:
     index, n_recordings = truth.manifest.recording_index, truth.manifest.n_recordings
+    thresholds_s = np.array(THRESHOLDS_S)[:, None]
+    due, warned = (is_warning(each, threshold_s=thresholds_s) for each in (truth.ttc_s, predicted_ttc_s))
 
-    def by_recording(chosen: list[NDArray[np.bool_]]) -> Floats:
-        columns = [np.bincount(index[rows], minlength=n_recordings) for rows in chosen]
-        return np.stack(columns, axis=1).astype(float)
+    def by_recording(*sides: NDArray[np.bool_]) -> Floats:
+        rows = np.stack(sides, axis=1).reshape(-1, len(index))
+        return np.stack([np.bincount(index, weights=row, minlength=n_recordings) for row in rows], axis=1)
 
-    of_side, wrong = list[NDArray[np.bool_]](), list[NDArray[np.bool_]]()
-    for threshold_s in THRESHOLDS_S:
-        due, warned = (is_warning(each, threshold_s=threshold_s) for each in (truth.ttc_s, predicted_ttc_s))
-        of_side += [due, ~due]
-        wrong += [due & ~warned, ~due & warned]
-    counts, sums = by_recording(of_side), 100 * by_recording(wrong)
+    counts, sums = by_recording(due, ~due), 100 * by_recording(due & ~warned, ~due & warned)
     low, high = _intervals(truth, counts, sums[None], unit)
+    n, totals = counts.sum(axis=0), sums.sum(axis=0)
     sides = [
         {
-            "n": int(n),
-            "share": round(total / n, decimals) if n else None,
-            "interval": [round(end, decimals) for end in ends] if np.isfinite(ends[0]) else None,
+            "n": int(n[i]),
+            "share": round(float(totals[i] / n[i]), decimals) if n[i] else None,
+            "interval": [round(float(end[0, i]), decimals) for end in (low, high)]
+            if np.isfinite(low[0, i])
+            else None,
         }
-        for n, total, *ends in zip(
-            counts.sum(axis=0).tolist(),
-            sums.sum(axis=0).tolist(),
-            low[0].tolist(),
-            high[0].tolist(),
-            strict=True,
-        )
+        for i in range(len(n))
     ]
     return [
         {"threshold_s": threshold_s, "missed": missed, "false": false}

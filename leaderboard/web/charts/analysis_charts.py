@@ -61,7 +61,7 @@ def error_analysis_tables(closer: Analysis, best: Reference | None) -> dict[str,
         "warnings": warnings(content.get("warnings", ())),
         "threshold": f"{WARNING_S:g} s",
         "at_threshold": [
-            (name, _share_words(row[side]), grouped(row[side]["n"]), condition)
+            (name, *_side_words(row[side]), condition)
             for row in content.get("warnings", ())
             if row["threshold_s"] == WARNING_S
             for name, side, condition in _SIDES
@@ -202,7 +202,8 @@ def warnings(rows: Sequence[Row]) -> Chart:
     """Draw the shares of missed warnings and of false alarms by the threshold of a warning."""
     if not rows:
         return empty("warnings")
-    has_intervals = any(row[side]["interval"] for row in rows for _, side, _ in _SIDES)
+    sides = [side for _, side, _ in _SIDES]
+    has_intervals = any(row[side]["interval"] for row in rows for side in sides)
     axis = {"type": "value", "min": rows[0]["threshold_s"], "max": rows[-1]["threshold_s"], "interval": 1}
     frame = Frame(
         x_axes=[x_axis("Threshold in s", axis) for _ in _SIDES],
@@ -221,14 +222,7 @@ def warnings(rows: Sequence[Row]) -> Chart:
         options=frame.options(),
         columns=columns,
         rows=tuple(
-            (
-                tick_text(row["threshold_s"]),
-                *(
-                    text
-                    for _, side, _ in _SIDES
-                    for text in (grouped(row[side]["n"]), _share_words(row[side]))
-                ),
-            )
+            (tick_text(row["threshold_s"]), *(text for side in sides for text in _side_words(row[side])))
             for row in rows
         ),
         numbers=tuple(range(1, len(columns))),
@@ -243,7 +237,7 @@ def _side_series(rows: Sequence[Row], name: str, side: str, *, grid: int) -> Ite
             row[side]["share"],
             (
                 f"{tick_text(row['threshold_s'])} s",
-                f"{name} {_share_words(row[side])} %",
+                f"{name} {_side_words(row[side])[1]} %",
                 f"of {counted(row[side]['n'], 'sequence')}",
             ),
         )
@@ -255,8 +249,8 @@ def _side_series(rows: Sequence[Row], name: str, side: str, *, grid: int) -> Ite
     yield marks(SHARE, points, Look("--s1", size=5.0), grid=grid) | {"upright": True}
 
 
-def _share_words(share: Row) -> str:
-    return _with_interval(share["share"], share["interval"])
+def _side_words(side: Row) -> tuple[str, str]:
+    return grouped(side["n"]), _with_interval(side["share"], side["interval"])
 
 
 # --- how errors are distributed --------------------------------------------------------------------------

@@ -28,7 +28,7 @@ HALF_OPEN = (
         ({"limit_s": float("inf")}, "its limit is inf s"),
         ({"near_zero_s": (-25.0, 0.05)}, "near 0 it truncates to -25 s and 0.05 s, and its limit is 20 s"),
         ({"near_zero_s": (0.1, 0.2)}, "near 0 it truncates to 0.1 s and 0.2 s"),
-        ({"ranges": (TTCRange("near", 3.0, 3.0),)}, "the TTC range 'near' begins at 3 s and ends at 3 s"),
+        ({"ranges": (TTCRange("near", 3.0, 3.0),)}, "the TTC range 'near' is 3–3 s"),
         ({"ranges": (TTCRange("Near", 0.0, 3.0),)}, "the TTC range 0–3 s is called 'Near'"),
         ({"ranges": (TTCRange("overall", 0.0, 3.0),)}, "the TTC range 0–3 s is called 'overall'"),
         (
