@@ -131,19 +131,15 @@ def read(path: Path, *, site_name: str = "") -> Benchmark:
     except msgspec.ValidationError as error:
         sentence, _, key = str(error).partition(" - at `$.")
         key = key.removesuffix("`")
-        where = f"{path}: {key} is {_value(document, key)!r:.80}; " if key else f"{path}: "
+        value: Any = document
+        for part in re.findall(r"\w+", key):  # of a key such as splits[0].name
+            value = value[int(part) if isinstance(value, list) else part]
+        where = f"{path}: {key} is {value!r:.80}; " if key else f"{path}: "
         raise ImproperlyConfigured(f"{where}{sentence[:1].lower()}{sentence[1:]}.") from None
     for key, value, expected in _faults(benchmark):
         raise ImproperlyConfigured(f"{path}: {key} is {value!r}; expected {expected}.")
     name = site_name or benchmark.site_name or f"{benchmark.name} leaderboard"
     return msgspec.structs.replace(benchmark, site_name=name)
-
-
-def _value(document: Any, key: str) -> Any:
-    """Return the value at a key such as `splits[0].name`."""
-    for part in re.findall(r"\w+", key):
-        document = document[int(part) if isinstance(document, list) else part]
-    return document
 
 
 def _faults(benchmark: Benchmark) -> Iterator[tuple[str, object, str]]:

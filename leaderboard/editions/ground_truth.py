@@ -71,7 +71,10 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
         raise Refused("unknown-split", f"There is no split {split_name!r}; expected one of {known}.")
     truth = evaluator.read_truth(path)
     old = split.current_edition.ground_truth if split.current_edition else None
-    counts, n_in_ranges = _compared(old, truth), _counts(truth)
+    counts = _compared(old, truth)
+    n_in_ranges = {OVERALL: truth.n_sequences, **truth.counts_of(known_ranges().values())}
+    for each in PROTOCOLS.values():
+        n_in_ranges[GroundTruth.out_of_range_key(each)] = truth.n_outside(each.ranges)
     # Before anything is written: the mark of hidden values would stay on those of an open split.
     _require_own(split, GroundTruth.objects.filter(digest=truth.digest).first())
     truth_values.save(truth, is_hidden=split.is_hidden)
@@ -99,15 +102,6 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
         if is_new:
             audit.record(verb="imported", noun="GroundTruth", noun_id=row.pk, actor=actor)
     return row
-
-
-def _counts(truth: evaluator.GroundTruth) -> dict[str, int]:
-    """Sequences in all, in each TTC range of all protocols, and in none of the ranges of each protocol."""
-    outside = {
-        GroundTruth.out_of_range_key(protocol): truth.n_outside(protocol.ranges)
-        for protocol in PROTOCOLS.values()
-    }
-    return {OVERALL: truth.n_sequences, **truth.counts_of(known_ranges().values()), **outside}
 
 
 def _require_own(split: Split, row: GroundTruth | None) -> None:

@@ -79,19 +79,17 @@ def document(edition: Edition) -> dict[str, Any]:
                 "@id": _SEQUENCES,
                 "name": _SEQUENCES,
                 "key": {"@id": f"{_SEQUENCES}/anno_id"},
-                "field": [_field(column) for column in columns],
+                "field": [
+                    {
+                        "@type": "cr:Field",
+                        "@id": f"{_SEQUENCES}/{column}",
+                        "name": column,
+                        "description": _COLUMNS[column][1],
+                        "dataType": _COLUMNS[column][0],
+                        "source": {"fileObject": {"@id": _FILE}, "extract": {"column": column}},
+                    }
+                    for column in columns
+                ],
             }
         ],
-    }
-
-
-def _field(column: str) -> dict[str, Any]:
-    data_type, meaning = _COLUMNS[column]
-    return {
-        "@type": "cr:Field",
-        "@id": f"{_SEQUENCES}/{column}",
-        "name": column,
-        "description": meaning,
-        "dataType": data_type,
-        "source": {"fileObject": {"@id": _FILE}, "extract": {"column": column}},
     }

@@ -38,19 +38,15 @@ def of_entry(entry: Entry, *, edition: Edition | None) -> Iterator[str]:
 
     A row under a pseudonym has none: the repository of its model would tell whose it is.
     """
-    if entry.kind != "submission" or entry.visibility != Visibility.PUBLIC or edition is None:
+    is_public = entry.kind == "submission" and entry.visibility == Visibility.PUBLIC
+    if edition is None or entry.value is None or not is_public or not is_configured():
         return
     metric, dataset = edition.rules.primary, settings.BENCHMARK.dataset
-    value = entry.scores[metric.name]
-    if value is None or not is_configured():
-        return
+    task = dataset.hugging_face_task.replace("{split}", edition.split_id)
     facts = f"{edition.split_id}, edition {edition.number}, protocol {edition.protocol}"
     members = {
-        "dataset": {
-            "id": dataset.hugging_face_id,
-            "task_id": dataset.hugging_face_task.replace("{split}", edition.split_id),
-        },
-        "value": float(format_rounded(value, decimals=entry.decimals)),
+        "dataset": {"id": dataset.hugging_face_id, "task_id": task},
+        "value": float(format_rounded(entry.value, decimals=entry.decimals)),
         "date": f"{entry.date:%Y-%m-%d}",
         "source": {
             "url": settings.SITE_URL + reverse("method", args=[entry.method_id]),

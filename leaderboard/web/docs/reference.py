@@ -35,12 +35,6 @@ GROUND_TRUTH_CODES: Final = frozenset(
 )
 
 
-def example_split(splits: Sequence[Split], *, now: datetime) -> Split | None:
-    """Return the split for the example commands: one that takes submissions, else one with a manifest."""
-    is_open = (split for split in splits if admissions.is_open(split, now=now))
-    return next(is_open, None) or next((split for split in splits if split.has_ground_truth), None)
-
-
 def _as_in_toolkit(protocol: Protocol) -> str:
     """Name the metrics that differ from those of the dataset's toolkit near 0 at most; empty without any."""
     toolkit = PROTOCOLS["toolkit"]
@@ -63,7 +57,9 @@ def _metrics(protocol: Protocol, splits: Sequence[Split]) -> list[tuple[Metric, 
 
 
 def docs(splits: Sequence[Split], *, now: datetime) -> dict[str, Any]:
-    example = example_split(splits, now=now)
+    # For the example commands: a split that takes submissions, else one with a manifest.
+    is_open = (split for split in splits if admissions.is_open(split, now=now))
+    example = next(is_open, None) or next((split for split in splits if split.has_ground_truth), None)
     # The board that is quoted; without it the first.
     main = next(
         (split for split in splits if split.pk == settings.BENCHMARK.default_split), next(iter(splits), None)
