@@ -7,7 +7,7 @@ from datetime import datetime
 from typing import Any
 
 from django.db import transaction
-from django.db.models import QuerySet
+from django.db.models import Model, QuerySet
 
 from leaderboard.models import AuditEvent, AuditText, SweepBeat, User
 from leaderboard.models.audit import GENESIS, Unsealed
@@ -41,6 +41,11 @@ def record(
     AuditText.objects.bulk_create(texts.values())
     stored = _plain(details or {}) | {name: f"{_TEXT}{row.pk}" for name, row in texts.items()}
     return AuditEvent.objects.create(verb=verb, noun=noun, noun_id=noun_id, actor=actor, details=stored)
+
+
+def record_of(row: Model, verb: str, **more: Any) -> AuditEvent:
+    """Write one action on a row, which its model and its key name; `more` as in `record`."""
+    return record(verb=verb, noun=type(row).__name__, noun_id=row.pk, **more)
 
 
 def names_in(events: Iterable[AuditEvent]) -> dict[str, str]:

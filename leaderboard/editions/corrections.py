@@ -249,9 +249,7 @@ def discard(*, edition: Edition, reason: str, now: datetime, actor: User | None)
         edition.discarded_at = now
         edition.save(update_fields=["discarded_at"])
         lifecycle.cancel_edition(edition=edition)
-        audit.record(
-            verb="discarded", noun="Edition", noun_id=edition.pk, actor=actor, details={"reason": reason}
-        )
+        audit.record_of(edition, "discarded", actor=actor, details={"reason": reason})
 
 
 def _locked(edition: Edition) -> tuple[Edition, Split]:

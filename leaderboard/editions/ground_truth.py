@@ -100,7 +100,7 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
         if old is not None and counts is not None:
             _keep_comparison(old, row, counts)
         if is_new:
-            audit.record(verb="imported", noun="GroundTruth", noun_id=row.pk, actor=actor)
+            audit.record_of(row, "imported", actor=actor)
     return row
 
 
@@ -198,9 +198,7 @@ def new_edition(
         opened_at=now,
         opened_by=actor,
     )
-    audit.record(
-        verb="opened", noun="Edition", noun_id=edition.pk, actor=actor, details={"edition": str(edition)}
-    )
+    audit.record_of(edition, "opened", actor=actor, details={"edition": str(edition)})
     return edition
 
 
@@ -221,10 +219,9 @@ def make_board(
         edition.save(update_fields=["published_at"])
     split.current_edition = edition
     split.save(update_fields=["current_edition"])
-    audit.record(
-        verb=kind.lower(),
-        noun="Edition",
-        noun_id=edition.pk,
+    audit.record_of(
+        edition,
+        kind.lower(),
         actor=actor,
         details={"edition": str(edition), "reason": reason, "left_out": list(left_out)},
     )

@@ -74,10 +74,9 @@ def change(*, split_name: str, policy: Policy, actor: User | None) -> Split:
         if after != before:
             pairs = {name: (getattr(before, name), getattr(after, name)) for name in NAMES}
             split.save(update_fields=list(NAMES))
-            audit.record(
-                verb="changed",
-                noun="Split",
-                noun_id=split.pk,
+            audit.record_of(
+                split,
+                "changed",
                 actor=actor,
                 details={name: f"{old} → {new}" for name, (old, new) in pairs.items() if old != new},
             )

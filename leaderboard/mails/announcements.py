@@ -71,10 +71,9 @@ def announce(announcement: Announcement, *, now: datetime, actor: User | None) -
             ]
         )
         if people:
-            audit.record(
-                verb="announced",
-                noun="Split",
-                noun_id=split.pk,
+            audit.record_of(
+                split,
+                "announced",
                 actor=actor,
                 details={"subject": announcement.subject, "n_people": len(people)},
             )

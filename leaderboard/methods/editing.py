@@ -38,13 +38,7 @@ def edit(
         for name, value in changed.items():
             setattr(row, name, value)
         row.save(update_fields=[*changed, *(["renamed_at"] if "name" in changed else [])])
-        audit.record(
-            verb="edited",
-            noun="Method",
-            noun_id=row.pk,
-            actor=actor,
-            details={"fields": sorted(changed)},
-        )
+        audit.record_of(row, "edited", actor=actor, details={"fields": sorted(changed)})
         if row.was_shown():
             board_versions.bump_for_methods([row.pk])
     return row

@@ -52,10 +52,9 @@ def change(
             teams.show_name(row.team)
         row.shown_at = row.shown_at or now
         row.save(update_fields=["visibility", "reveal_at", "shown_at"])
-        audit.record(
-            verb="shown",
-            noun="Method",
-            noun_id=row.pk,
+        audit.record_of(
+            row,
+            "shown",
             actor=actor,
             details={
                 "from": before["visibility"],
@@ -155,7 +154,7 @@ def _number_taken_name(method: Method) -> None:
         method.save(update_fields=["name"])
         details = {"reason": "another method used this name on the boards first"}
         names = {"from": before, "to": method.name}
-        audit.record(verb="renamed", noun="Method", noun_id=method.pk, details=details, names=names)
+        audit.record_of(method, "renamed", details=details, names=names)
 
 
 def _public_twin(name: str, *, but: Method) -> str | None:

@@ -37,4 +37,4 @@ def delete(*, method: Method, actor: User, now: datetime) -> None:
             intake.withdraw(submission=sent, actor=actor, now=now)
         row.deleted_at = now
         row.save(update_fields=["deleted_at"])
-        audit.record(verb="deleted", noun="Method", noun_id=row.pk, actor=actor, names={"name": row.name})
+        audit.record_of(row, "deleted", actor=actor, names={"name": row.name})

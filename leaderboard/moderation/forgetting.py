@@ -128,12 +128,8 @@ def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> Non
             heir.save(update_fields=["is_owner"])
         _delete_rows(row)
         _blank(row)
-        audit.record(
-            verb="forgotten",
-            noun="User",
-            noun_id=row.pk,
-            actor=actor,
-            details={"reason": reason, "team": str(team.pk) if team else None},
+        audit.record_of(
+            row, "forgotten", actor=actor, details={"reason": reason, "team": str(team.pk) if team else None}
         )
         if team is not None:
             board_versions.bump_for_methods(

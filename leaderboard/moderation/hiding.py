@@ -26,13 +26,8 @@ def rename_team(*, team: Team, name: str, reason: str, actor: User | None, now: 
         name = clean_name("name", name or masked("Team", row.pk))
         before = row.name
         teams.set_name(team=row, name=name, now=now)
-        audit.record(
-            verb="renamed",
-            noun="Team",
-            noun_id=row.pk,
-            actor=actor,
-            details={"reason": reason},
-            names={"from": before, "to": name},
+        audit.record_of(
+            row, "renamed", actor=actor, details={"reason": reason}, names={"from": before, "to": name}
         )
         _changed(Method.objects.filter(team=row))
     return row
@@ -48,13 +43,8 @@ def rename_method(*, method: Method, name: str, reason: str, actor: User | None,
         editing.require_distinct_name(name, team=row.team, field="name", but=row)
         before, row.name, row.renamed_at = row.name, name, now
         row.save(update_fields=["name", "renamed_at"])
-        audit.record(
-            verb="renamed",
-            noun="Method",
-            noun_id=row.pk,
-            actor=actor,
-            details={"reason": reason},
-            names={"from": before, "to": name},
+        audit.record_of(
+            row, "renamed", actor=actor, details={"reason": reason}, names={"from": before, "to": name}
         )
         _changed(Method.objects.filter(pk=row.pk))
     return row
@@ -68,7 +58,7 @@ def clear_texts(*, method: Method, reason: str, actor: User | None) -> Method:
         row = _locked(method)
         row.description = row.paper_url = row.code_url = ""
         row.save(update_fields=["description", "paper_url", "code_url"])
-        audit.record(verb="cleared", noun="Method", noun_id=row.pk, actor=actor, details={"reason": reason})
+        audit.record_of(row, "cleared", actor=actor, details={"reason": reason})
         _changed(Method.objects.filter(pk=row.pk))
     return row
 
@@ -88,12 +78,8 @@ def move_method(*, method: Method, to: Team, reason: str, actor: User | None) ->
             teams.show_name(to)
         row.team = to
         row.save(update_fields=["team"])
-        audit.record(
-            verb="moved",
-            noun="Method",
-            noun_id=row.pk,
-            actor=actor,
-            details={"reason": reason, "from": str(before), "to": str(to.pk)},
+        audit.record_of(
+            row, "moved", actor=actor, details={"reason": reason, "from": str(before), "to": str(to.pk)}
         )
         _changed(Method.objects.filter(pk=row.pk))
     return row
@@ -117,13 +103,7 @@ def withdraw_entry(
         row.withdrawn_at = row.withdrawn_at or now
         row.hidden_at = now if is_hidden else None
         row.save(update_fields=["withdrawn_at", "hidden_at"])
-        audit.record(
-            verb="hidden" if is_hidden else "withdrawn",
-            noun="Submission",
-            noun_id=row.pk,
-            actor=actor,
-            details={"reason": reason},
-        )
+        audit.record_of(row, "hidden" if is_hidden else "withdrawn", actor=actor, details={"reason": reason})
         board_versions.bump(row.split_id)
     return row
 
@@ -138,13 +118,7 @@ def set_active(*, user: User, is_active: bool, reason: str, actor: User | None) 
         row = User.objects.select_for_update(no_key=True).get(pk=user.pk)
         row.is_active = is_active
         row.save(update_fields=["is_active"])
-        audit.record(
-            verb="opened" if is_active else "closed",
-            noun="User",
-            noun_id=row.pk,
-            actor=actor,
-            details={"reason": reason},
-        )
+        audit.record_of(row, "opened" if is_active else "closed", actor=actor, details={"reason": reason})
     return row
 
 

@@ -35,5 +35,5 @@ def set_maintainer(*, user: User, is_maintainer: bool, reason: str) -> User:
         row.is_staff = row.is_superuser = is_maintainer
         row.save(update_fields=["is_staff", "is_superuser"])
         details = {"is_maintainer": is_maintainer, "reason": reason}
-        audit.record(verb="changed", noun="User", noun_id=row.pk, actor=None, details=details)
+        audit.record_of(row, "changed", actor=None, details=details)
     return row

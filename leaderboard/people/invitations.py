@@ -59,7 +59,7 @@ def make(*, team: Team, actor: User, now: datetime) -> tuple[Invitation, str]:
             created_at=now,
             expires_at=now + LIFETIME,
         )
-        audit.record(verb="invited", noun="Team", noun_id=row.pk, actor=actor, details=_named(invitation))
+        audit.record_of(row, "invited", actor=actor, details=_named(invitation))
     return invitation, secret
 
 
@@ -88,9 +88,7 @@ def revoke(*, invitation: Invitation, actor: User, now: datetime) -> bool:
         fresh = Invitation.objects.filter(pk=invitation.pk, accepted_at=None, revoked_at=None)
         if not fresh.update(revoked_at=now):
             return False
-        audit.record(
-            verb="revoked_invitation", noun="Team", noun_id=row.pk, actor=actor, details=_named(invitation)
-        )
+        audit.record_of(row, "revoked_invitation", actor=actor, details=_named(invitation))
     return True
 
 
@@ -157,10 +155,9 @@ def accept(*, secret: str, user: User, now: datetime) -> Team:
             teams.end_invitations(former, of=user)
             teams.end_if_empty(former)
         Invitation.objects.filter(pk=invitation.pk).update(accepted_by=user, accepted_at=now)
-        audit.record(
-            verb="joined",
-            noun="Team",
-            noun_id=team.pk,
+        audit.record_of(
+            team,
+            "joined",
             actor=user,
             details={
                 **_named(invitation),

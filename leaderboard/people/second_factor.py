@@ -26,6 +26,4 @@ def reset(*, user: User, reason: str) -> AuditEvent:
         n_deleted, _ = Authenticator.objects.filter(user=user).delete()
         if not n_deleted:
             raise Refused("bad-value", "The account has no second factor; there is nothing to reset.")
-        return audit.record(
-            verb="second factor reset", noun="User", noun_id=user.pk, details={"reason": reason}
-        )
+        return audit.record_of(user, "second factor reset", details={"reason": reason})

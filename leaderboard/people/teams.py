@@ -57,9 +57,7 @@ def rename(*, team: Team, name: str, actor: User, now: datetime) -> Team:
         require_rename_possible(renamed_at=row.renamed_at, now=now)
         before = row.name
         set_name(team=row, name=name, now=now)
-        audit.record(
-            verb="renamed", noun="Team", noun_id=row.pk, actor=actor, names={"from": before, "to": name}
-        )
+        audit.record_of(row, "renamed", actor=actor, names={"from": before, "to": name})
         board_versions.bump_for_methods(Method.objects.filter(team=row).shown().values_list("pk", flat=True))
     return row
 
@@ -98,7 +96,7 @@ def show_name_in_any_case(team: Team) -> None:
     if name != before:
         details = {"reason": "another team used this name on the boards first"}
         names = {"from": before, "to": name}
-        audit.record(verb="renamed", noun="Team", noun_id=team.pk, details=details, names=names)
+        audit.record_of(team, "renamed", details=details, names=names)
 
 
 def require_showable(team: Team) -> None:
@@ -123,7 +121,7 @@ def leave(*, user: User) -> Team:
         membership.delete()
         end_invitations(team, of=user)
         is_gone = end_if_empty(team)
-        audit.record(verb="left", noun="Team", noun_id=team.pk, actor=user, details={"team_ended": is_gone})
+        audit.record_of(team, "left", actor=user, details={"team_ended": is_gone})
     return team
 
 
@@ -136,9 +134,7 @@ def remove(*, team: Team, member: User, actor: User) -> None:
             raise Refused("not-yourself", "You cannot remove yourself; expected another member of your team.")
         _membership_in(row, member).delete()
         end_invitations(row, of=member)
-        audit.record(
-            verb="removed_member", noun="Team", noun_id=row.pk, actor=actor, details={"user": member.pk}
-        )
+        audit.record_of(row, "removed_member", actor=actor, details={"user": member.pk})
 
 
 def hand_over(*, team: Team, to: User, actor: User) -> None:
@@ -151,7 +147,7 @@ def hand_over(*, team: Team, to: User, actor: User) -> None:
         heir = _membership_in(row, to)
         Membership.objects.filter(team=row, user=actor).update(is_owner=False)
         Membership.objects.filter(pk=heir.pk).update(is_owner=True)
-        audit.record(verb="handed_over", noun="Team", noun_id=row.pk, actor=actor, details={"user": to.pk})
+        audit.record_of(row, "handed_over", actor=actor, details={"user": to.pk})
 
 
 def appoint(*, team: Team, to: User, reason: str, actor: User | None) -> None:
@@ -164,7 +160,7 @@ def appoint(*, team: Team, to: User, reason: str, actor: User | None) -> None:
         row.memberships.exclude(pk=heir.pk).update(is_owner=False)
         row.memberships.filter(pk=heir.pk).update(is_owner=True)
         details = {"user": to.pk, "from": before, "reason": reason}
-        audit.record(verb="appointed_owner", noun="Team", noun_id=row.pk, actor=actor, details=details)
+        audit.record_of(row, "appointed_owner", actor=actor, details=details)
 
 
 # --- what several of these need --------------------------------------------------------------------------
@@ -260,7 +256,7 @@ def _created(team: Team, user: User) -> Team:
     try:
         with transaction.atomic():
             Membership.objects.create(team=team, user=user, is_owner=True)
-            audit.record(verb="created", noun="Team", noun_id=team.pk, actor=user)
+            audit.record_of(team, "created", actor=user)
     except IntegrityError:
         team.delete()
         return team_of(user=user)

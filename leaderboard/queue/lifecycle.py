@@ -340,9 +340,7 @@ def _strike(
         status=status.value,
     )
     if exhausted:
-        audit.record(
-            verb="system_error", noun="Evaluation", noun_id=evaluation.pk, details={"reason": reason}
-        )
+        audit.record_of(evaluation, "system_error", details={"reason": reason})
     return status
 
 
@@ -359,7 +357,7 @@ def cancel(*, submission: Submission, actor: User | None) -> int:
     with transaction.atomic():
         n_cancelled = _cancel(Evaluation.objects.filter(submission=submission))
         if n_cancelled:
-            audit.record(verb="cancelled", noun="Submission", noun_id=submission.pk, actor=actor)
+            audit.record_of(submission, "cancelled", actor=actor)
     return n_cancelled
 
 
@@ -383,7 +381,5 @@ def retry(*, evaluation: Evaluation, actor: User, reason: str = "") -> None:
         )
         if not changed:
             raise LostRace(f"evaluation {evaluation.pk} is not a system error; there is nothing to retry")
-        audit.record(
-            verb="retried", noun="Evaluation", noun_id=evaluation.pk, actor=actor, details={"reason": reason}
-        )
+        audit.record_of(evaluation, "retried", actor=actor, details={"reason": reason})
         transaction.on_commit(lambda: _announce(evaluation), robust=True)

@@ -48,7 +48,7 @@ def admit(*, team: Team, split: Split, reason: str, actor: User | None, now: dat
             team=team, split=split, defaults={"reason": reason, "admitted_by": actor, "admitted_at": now}
         )
         details = {"split": split.pk, "reason": reason}
-        audit.record(verb="admitted", noun="Team", noun_id=team.pk, actor=actor, details=details)
+        audit.record_of(team, "admitted", actor=actor, details=details)
     return row
 
 

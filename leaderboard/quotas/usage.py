@@ -297,12 +297,8 @@ def override(
             team=team, split=split, defaults={**rules, "reason": reason, "set_by": actor, "set_at": now}
         )
         texts = {name: str(value) if isinstance(value, timedelta) else value for name, value in rules.items()}
-        audit.record(
-            verb="quota_overridden",
-            noun="Team",
-            noun_id=team.pk,
-            actor=actor,
-            details={"split": split.pk, "reason": reason, **texts},
+        audit.record_of(
+            team, "quota_overridden", actor=actor, details={"split": split.pk, "reason": reason, **texts}
         )
     return row
 

@@ -158,7 +158,7 @@ def _record(request: SubmissionRequest, file: files.StoredFile, *, split: Split)
     _queue(submission, split=split)
     if changes:
         submission.method = editing.edit(method=method, changes=changes, actor=request.user)
-    audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=request.user)
+    audit.record_of(submission, "submitted", actor=request.user)
     return Submitted(submission=submission, is_new=True)
 
 
@@ -237,7 +237,7 @@ def withdraw(*, submission: Submission, actor: User, now: datetime) -> bool:
         if not changed:
             return False
         lifecycle.cancel(submission=submission, actor=actor)
-        audit.record(verb="withdrawn", noun="Submission", noun_id=submission.pk, actor=actor)
+        audit.record_of(submission, "withdrawn", actor=actor)
         # Before looking who is private: whoever shows a method holds this until it is shown.
         board_versions.lock()
         if Method.objects.shown().filter(pk=submission.method_id).exists():
