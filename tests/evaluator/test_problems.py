@@ -8,7 +8,7 @@ import re
 import pytest
 
 from evaluator import PROBLEM_CODES, Problem, Rejected
-from evaluator.problems import Findings, pointer, quoted
+from evaluator.problems import MAX_LISTED, Findings, listed, n_problems_in_words, pointer, quoted
 
 
 def test_codes_are_kebab_case_and_explained() -> None:
@@ -98,3 +98,22 @@ def test_names_of_strangers_are_shown_in_printable_ascii() -> None:
         assert len(quoted(text)) < 400
         assert pointer(text).isascii()
         assert pointer(text).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("n_problems", "n_lines", "words"),
+    [
+        (1, 1, "1 problem"),
+        (7_000, 7_000, "7,000 problems"),
+        (7_000, 1, "7,000 problems; equal ones share a line"),
+    ],
+)
+def test_problems_are_counted_in_words(n_problems: int, n_lines: int, words: str) -> None:
+    assert n_problems_in_words(n_problems, n_lines=n_lines) == words
+
+
+def test_the_first_names_of_a_long_list_are_named() -> None:
+    names = [str(number) for number in range(MAX_LISTED + 1)]
+    assert listed(names[:2]) == "0, 1"
+    assert listed(names[:-1]) == ", ".join(names[:-1])
+    assert listed(names) == f"{', '.join(names[:-1])}, … (the first {MAX_LISTED})"

@@ -166,3 +166,19 @@ def test_key_set_that_cannot_be_relied_on_is_refused(keys: bytes) -> None:
     with pytest.raises(receipts.NotVerified) as caught:
         receipts.read_keys(keys)
     assert caught.value.code == "receipt-keys"
+
+
+@pytest.mark.parametrize(
+    ("value", "decimals", "text"),
+    [(15.0, 2, "15.00"), (0.125, 2, "0.12"), (15.06, 1, "15.1"), (None, 2, None)],
+)
+def test_a_score_is_signed_as_a_decimal_text(value: float | None, decimals: int, text: str | None) -> None:
+    assert receipts.decimal(value, decimals=decimals) == text
+
+
+def test_base64url_has_one_spelling() -> None:
+    assert receipts.encode(b"tsttc?>") == "dHN0dGM_Pg"
+    assert receipts.decode("dHN0dGM_Pg") == b"tsttc?>"
+    for spelling in ("dHN0dGM_Pg==", "dHN0dGM/Pg", "dHN0dGM_Ph", "dHN0 dGM_Pg"):
+        with pytest.raises(ValueError):
+            receipts.decode(spelling)

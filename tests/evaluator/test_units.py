@@ -20,7 +20,7 @@ from evaluator import (
 from evaluator.scoring.intervals import recording_sums
 from evaluator.scoring.uncertainty import bootstrap_of, by_units
 from evaluator.truth.csv_tables import Table
-from evaluator.units import DAY, GIVEN, RECORDING, units_of
+from evaluator.units import DAY, GIVEN, RECORDING, noun_of, units_of
 from tests.evaluator.recordings import predictions
 from tests.evaluator.worlds import Tsttc
 
@@ -208,3 +208,7 @@ def test_compare_says_over_which_units_it_tests(tsttc: Tsttc, folder: Path) -> N
     assert "95% confidence intervals and p-values over 96 recordings\n" in text
     board = tsttc("compare", "A", "B", "--unit", "day")
     assert (board.exit_code, "--unit needs --truth" in board.stderr) == (2, True)
+
+
+def test_a_unit_has_a_noun() -> None:
+    assert [noun_of(kind) for kind in (RECORDING, DAY, GIVEN)] == ["recording", "day", "unit"]

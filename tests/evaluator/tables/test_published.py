@@ -14,8 +14,10 @@ from evaluator.tables.published import (
     as_latex,
     as_markdown,
     document,
+    method_name,
     printed,
     printed_tables,
+    setting_text,
 )
 from tests.services import shared_data
 
@@ -89,3 +91,9 @@ def test_every_table_has_every_format() -> None:
     for shown in printed_tables():
         assert all(WRITERS[name](shown).endswith("\n") for name in WRITERS), shown.table.name
         assert json.loads(WRITERS["json"](shown)) == json.loads(json.dumps(document(shown)))
+
+
+def test_methods_and_settings_are_written_as_the_paper_prints_them() -> None:
+    assert [method_name(row) for row in table("main-results").rows][:2] == ["Detection", "SOT"]
+    settings = {setting_text(row) for each in published_tables().tables for row in each.rows}
+    assert {"3,000", "blurred", "not blurred"} <= settings

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from evaluator import Rejected, read_truth
+from evaluator.truth.objects import text_of
 from tests.evaluator.toolkit_folders import camera, write_folder
 
 SIX = list(range(6))
@@ -64,3 +65,11 @@ def test_a_field_of_a_table_that_makes_no_sense_is_named(
     assert (problem.code, problem.where) == ("bad-field", "line 3")
     assert problem.message.startswith(f'{column} is "{text}"; expected ')
     assert expected in problem.message
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, ""), (0.25, "0.25"), (True, "1"), (False, "0"), ([0.25, 0.5, 0.75, 1.0], "0.25 0.5 0.75 1.0")],
+)
+def test_a_value_is_written_as_it_is_read(value: float | list[float] | None, text: str) -> None:
+    assert text_of(value) == text

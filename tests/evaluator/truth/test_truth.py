@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from evaluator import GroundTruth, Manifest, Problem, Rejected, read_manifest, read_truth
 from evaluator.predictions.revisions import rows_in
-from evaluator.truth.csv_tables import read_csv
+from evaluator.truth.csv_tables import name_fault, read_csv
 from tests.evaluator.worlds import make_truth
 
 HEADER = "anno_id,bag_stamp,cam_id,ts,track_id,ttc"
@@ -319,3 +319,22 @@ def test_pickled_objects_in_a_saved_file_are_not_read(tmp_path: Path) -> None:
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr("extra.npy", inner.getvalue())
     assert rejection(path).problems[0].code == "unreadable"
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("0007", None),
+        ("cam 8", None),
+        ("", "it is empty"),
+        ("a/b", 'it contains "/"'),
+        ("a,b", 'it contains ","'),
+        ('a"b', "it contains a quotation mark"),
+        (" a", "it has control characters, or spaces at an end"),
+        ("a\tb", "it has control characters, or spaces at an end"),
+        ("a" * 1_000, "it is longer than"),
+    ],
+)
+def test_a_name_in_a_key_has_a_fault_or_none(text: str, fault: str | None) -> None:
+    answer = name_fault(text)
+    assert answer is None if fault is None else answer and answer.startswith(fault)

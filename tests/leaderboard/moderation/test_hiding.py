@@ -1,6 +1,7 @@
 """Moderation and forgetting: a name is gone wherever it stood, and nothing that is left names the person."""
 
 import json
+from uuid import UUID
 
 import pytest
 from allauth.account.models import EmailAddress
@@ -306,3 +307,7 @@ def test_the_export_names_no_method_of_a_team_that_the_person_has_left(
     teams.leave(user=teammate)
     editing.edit(method=Method.objects.get(name="Hers"), changes={"name": "NextGenSecret"}, actor=owner)
     assert exported_names() == {ids["Hers"]: None, ids["Masked"]: None, ids["Shown"]: "Shown"}
+
+
+def test_a_neutral_name_has_the_noun_and_the_begin_of_the_key() -> None:
+    assert hiding.masked("Team", UUID(int=0x3F9C2A << 104)) == "Team 3f9c2a"

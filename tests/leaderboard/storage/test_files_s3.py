@@ -223,3 +223,21 @@ def test_an_sqlite_database_and_the_files_of_a_bucket_come_back_once(
     assert manifest.key.startswith("files/manifests/")
     copy = folder / contents.FILES / manifest.key.removeprefix("files/")
     assert manifest.get()["Body"].read() == copy.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("url", "parts"),
+    [
+        ("s3://tsttc", ("tsttc", "", None, "us-east-1")),
+        ("s3://tsttc/files/", ("tsttc", "files", None, "us-east-1")),
+        (
+            "s3://tsttc/files?endpoint=http://127.0.0.1:9000&region=eu-west-1",
+            ("tsttc", "files", "http://127.0.0.1:9000", "eu-west-1"),
+        ),
+    ],
+)
+def test_an_address_has_bucket_folder_endpoint_and_region(
+    url: str, parts: tuple[str, str, str | None, str]
+) -> None:
+    names = ("bucket_name", "location", "endpoint_url", "region_name")
+    assert s3.parsed(url) == dict(zip(names, parts, strict=True))
