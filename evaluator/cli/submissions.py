@@ -117,8 +117,8 @@ def submit(
             rival = gates.rival(client, split=split, method=worse_than, own=method)
         notice = _notice_of(client, method)
         _warn(notice, err=as_json)
-        if notice and not yes:
-            _require_consent()
+        if notice and not yes and sys.stdin.isatty() and not click.confirm("Submit?", err=True):
+            raise Failure("Nothing was submitted.", exit_code=Exit.USAGE, code="not-confirmed")
         submission = client.submit(
             data,
             filename=_name_to_send(predictions),
@@ -254,11 +254,6 @@ def _notice_of(client: Client, method: str) -> str:
 def _warn(notice: str, *, err: bool) -> None:
     if notice:
         click.echo(printable(notice), err=err)
-
-
-def _require_consent() -> None:
-    if sys.stdin.isatty() and not click.confirm("Submit?", err=True):
-        raise Failure("Nothing was submitted.", exit_code=Exit.USAGE, code="not-confirmed")
 
 
 def _name_to_send(path: Path) -> str:

@@ -54,11 +54,6 @@ INTERVALS_WITHIN_S = 10.0
 N_EARLY_LOOKS, EARLY_LOOK_S = 4, 0.2
 
 
-def _certificates(url: str) -> ssl.SSLContext | bool:
-    # Reading all certificates takes 40 ms, so plain HTTP loads none.
-    return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT) if urlsplit(url).scheme == "http" else True
-
-
 def _proxy_of(url: str) -> str:
     """Host and port of the proxy that the environment names for this address; empty for none."""
     site = urlsplit(url)
@@ -93,7 +88,8 @@ class Client:
         self._http = httpx.Client(
             headers=headers,
             timeout=self.timeout_s,
-            verify=_certificates(self.url),
+            # Reading all certificates takes 40 ms, so plain HTTP loads none.
+            verify=ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT) if urlsplit(self.url).scheme == "http" else True,
             # A proxy from the environment never leads to this very machine.
             trust_env=urlsplit(self.url).hostname not in LOOPBACK_HOSTS,
         )

@@ -118,7 +118,8 @@ def significant_together(differences: Sequence[Difference]) -> list[bool]:
     >>> significant_together([Difference(-1, -2, -0.1, p_below=below) for below in (0.01, 0.01, 1.0)])
     [True, True, False]
     """
-    tested = sorted((p, i) for i, each in enumerate(differences) if (p := _upper(each)) is not None)
+    bounds = [each.p_below if each.p is None else each.p for each in differences]
+    tested = sorted((p, i) for i, p in enumerate(bounds) if p is not None)
     apart = [False] * len(differences)
     for n_before, (p, i) in enumerate(tested):
         n_left = len(tested) - n_before
@@ -127,10 +128,6 @@ def significant_together(differences: Sequence[Difference]) -> list[bool]:
             break
         apart[i] = True
     return apart
-
-
-def _upper(difference: Difference) -> float | None:
-    return difference.p_below if difference.p is None else difference.p
 
 
 def too_few_units(n_effective: float | None, *, unit: str = RECORDING) -> str:

@@ -47,7 +47,6 @@ from leaderboard.quotas import admissions
 
 TEXT_COLUMNS = ("rank", "method", "team", "date")
 SORTABLE = (*TEXT_COLUMNS, *known_names())
-SORTS = (*SORTABLE, *(f"-{name}" for name in SORTABLE))
 """Every order that an address can ask for."""
 
 

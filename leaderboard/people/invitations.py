@@ -9,7 +9,6 @@ from datetime import datetime, timedelta
 
 from django.conf import settings
 from django.db import IntegrityError, transaction
-from django.db.models import QuerySet
 from django.urls import reverse
 
 from leaderboard import audit, board_versions
@@ -46,7 +45,8 @@ def make(*, team: Team, actor: User, now: datetime) -> tuple[Invitation, str]:
     with transaction.atomic():
         row = teams.locked_team(team)
         teams.require_owner(row, actor, doing="invites")
-        n_open = open_invitations(team=row, now=now).count()
+        usable = Invitation.objects.filter(accepted_at=None, revoked_at=None, expires_at__gt=now)
+        n_open = usable.filter(team=row).count()
         if n_open >= MAX_OPEN:
             raise Refused(
                 "too-many-invitations",
@@ -65,11 +65,6 @@ def make(*, team: Team, actor: User, now: datetime) -> tuple[Invitation, str]:
 
 def link(secret: str) -> str:
     return settings.SITE_URL + reverse("join_team", args=[secret])
-
-
-def open_invitations(*, team: Team, now: datetime) -> "QuerySet[Invitation]":
-    """Return the team's invitations that can still be used."""
-    return Invitation.objects.filter(team=team, accepted_at=None, revoked_at=None, expires_at__gt=now)
 
 
 def state_of(invitation: Invitation, *, now: datetime) -> str:

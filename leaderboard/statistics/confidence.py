@@ -253,11 +253,6 @@ def _published_values(edition: Edition, wanted: Sequence[UUID]) -> Floats:
     return values
 
 
-def _n_effective(edition: Edition) -> dict[str, float]:
-    degrees = uncertainty.degrees_of(recording_sums.unit_counts_of(edition))
-    return {name: cut_off(n) for name, n in zip(edition.rules.score_names, degrees.tolist(), strict=True)}
-
-
 def _quoted(entries: Entries, counts: Floats) -> Quoted | None:
     # Each value is as exact as printed: 14.8 is 14.75 to 14.85.
     values = np.array(entries.printed).reshape(-1, len(entries.edition.rules.score_names))
@@ -288,7 +283,11 @@ def _write(
     """
     edition = entries.edition
     shown = {row.evaluation_id for row in entries.rows if row.is_shown}
-    floor, n_effective = recording_sums.floor_of(edition), _n_effective(edition)
+    floor, degrees = (
+        recording_sums.floor_of(edition),
+        uncertainty.degrees_of(recording_sums.unit_counts_of(edition)),
+    )
+    n_effective = dict(zip(edition.rules.score_names, map(cut_off, degrees.tolist()), strict=True))
     with transaction.atomic():
         present = (
             Edition.objects.select_for_update(of=("self",), no_key=True)

@@ -31,7 +31,9 @@ def profile(entries: Sequence[Entry], *, n_metrics: int | None = None) -> Chart:
     if not shown:
         return empty("profile")
     panels = dict(list(grouped_names(shown[0].scores).items())[:n_metrics])
-    legend = _legend_names(shown)
+    # A legend needs different names.
+    methods = [entry.method for entry in shown]
+    legend = [each if methods.count(each) == 1 else f"{each} [{k + 1}]" for k, each in enumerate(methods)]
     frame = Frame(
         x_axes=[x_axis("", names_axis([_range_words(name) for name in names])) for names in panels.values()],
         y_axes=[error_axis(metric, _all_ends(shown, names)) for metric, names in panels.items()],
@@ -70,12 +72,6 @@ def profile(entries: Sequence[Entry], *, n_metrics: int | None = None) -> Chart:
         ),
         has_intervals=any(each.low is not None for entry in shown for each in entry.intervals.values()),
     )
-
-
-def _legend_names(shown: Sequence[Entry]) -> list[str]:
-    # A legend needs different names.
-    names = [entry.method for entry in shown]
-    return [name if names.count(name) == 1 else f"{name} [{k + 1}]" for k, name in enumerate(names)]
 
 
 def _all_ends(shown: Sequence[Entry], names: Sequence[str]) -> list[float]:

@@ -1,7 +1,6 @@
 """The page of a comparison."""
 
 from collections import Counter
-from collections.abc import Sequence
 
 from django.conf import settings
 from django.http import HttpRequest, HttpResponse
@@ -31,7 +30,10 @@ class UnknownSplit(comparisons.BadComparison):
 def compare(request: HttpRequest) -> HttpResponse:
     """Show two to five methods of one board and their differences, or the choice of them."""
     splits, wanted = splits_of(request), request.GET.getlist("m")
-    name = request.GET.get("split") or _first_scored(splits)
+    # Without a name the first split whose submissions are scored, the default one before others.
+    default = settings.BENCHMARK.default_split
+    ordered = sorted(splits, key=lambda split: (not split.has_ground_truth, split.pk != default))
+    name = request.GET.get("split") or (ordered[0].pk if ordered else default)
     split = next((split for split in splits if split.pk == name), None)
     try:
         if split is None:
@@ -50,13 +52,6 @@ def compare(request: HttpRequest) -> HttpResponse:
         return _refused(request, split, refusal)
     draw = cacheable(_drawn) if compared.is_complete else _drawn  # what is being computed changes by itself
     return draw(request, compared)
-
-
-def _first_scored(splits: Sequence[Split]) -> str:
-    """Return the first split whose submissions are scored, the default one before others."""
-    default = settings.BENCHMARK.default_split
-    ordered = sorted(splits, key=lambda split: (not split.has_ground_truth, split.pk != default))
-    return ordered[0].pk if ordered else default
 
 
 @cacheable

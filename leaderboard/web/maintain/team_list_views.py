@@ -27,7 +27,9 @@ def team_list(request: HttpRequest) -> HttpResponse:
     form = TeamSearch(request.GET)
     text = form.cleaned_data["team"] if form.is_valid() else ""
     page = Paginator(_teams(text), PER_PAGE).get_page(request.GET.get("page"))
-    context = {"form": form, "text": text, "page": page, "people": _people_alone(text)[:PER_PAGE]}
+    alone = User.objects.filter(email__icontains=text, membership=None).order_by("email")
+    people = alone.exclude(email__endswith=f"@{forgetting.NOWHERE}")[:PER_PAGE]
+    context = {"form": form, "text": text, "page": page, "people": people}
     return render(request, "maintain/teams.html", context, status=400 if form.errors else 200)
 
 
@@ -48,8 +50,3 @@ def _teams(text: str) -> QuerySet[Team]:
         )
         .order_by("name", "pk")
     )
-
-
-def _people_alone(text: str) -> QuerySet[User]:
-    alone = User.objects.filter(email__icontains=text, membership=None)
-    return alone.exclude(email__endswith=f"@{forgetting.NOWHERE}").order_by("email")

@@ -92,7 +92,8 @@ class PublicAnswersMiddleware:
         kept = cache.get(key)
         if kept is None:
             response: Any = self._get_response(request)
-            if request.method == "HEAD" or not _may_be_kept(response):
+            is_whole = is_cacheable(response) and response.status_code == 200 and not response.cookies
+            if request.method == "HEAD" or not is_whole:
                 return response
             kept = _answer_of(response)
             if len(kept.packed) <= MAX_BYTES:
@@ -119,10 +120,6 @@ def _is_ours(request: HttpRequest) -> bool:
     except DisallowedHost:
         return False
     return True
-
-
-def _may_be_kept(response: HttpResponseBase) -> bool:
-    return is_cacheable(response) and response.status_code == 200 and not response.cookies
 
 
 def _answer_of(response: HttpResponse) -> PublicAnswer:
