@@ -316,7 +316,9 @@ def _shown(scored_files: Sequence[_Scored], rows: Sequence[ResultRow], *, by: st
     if by is None and len(scored_files) == 1:
         lines = list(_in_words(scored_files[0].report, rows[0]))
     else:
-        lines = [*_table(rows, by=by), "", units(rows[0].scores), _counts_in_words(scored_files[0].report)]
+        report = scored_files[0].report
+        counts = f"{counted(report.n_sequences, 'sequence')}, protocol {report.protocol}"
+        lines = [*_table(rows, by=by), "", units(rows[0].scores), f"{counts}, truth {report.truth_digest}"]
         lines += [f"95% confidence intervals; bootstrap over {rows[0].units}"] if rows[0].units else []
     return "".join(f"{line}\n" for line in lines)
 
@@ -355,12 +357,6 @@ def _table(rows: Sequence[ResultRow], *, by: str | None) -> list[str]:
             values = [None if pair is None else pair[end] for pair in ends]
             lines.append(line([words, *[""] * (len(names) - 1)], values, ""))
     return aligned(lines, align="<" * len(names) + "." * len(scores) + ">")
-
-
-def _counts_in_words(report: Report) -> str:
-    return (
-        f"{counted(report.n_sequences, 'sequence')}, protocol {report.protocol}, truth {report.truth_digest}"
-    )
 
 
 def _per_sequence(scored_files: Sequence[_Scored]) -> bytes:
