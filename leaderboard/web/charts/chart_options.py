@@ -129,7 +129,8 @@ def error_axis(
     if min(known) <= 0 or max(known) <= _MAX_STRAIGHT * min(known):
         if is_near:
             ends = svg.round_ticks(min(known), max(known), n=4)
-            return y_axis(name, {"type": "value", "min": ends[0], "max": ends[-1]})
+            step = round(ends[1] - ends[0], 10)
+            return y_axis(name, {"type": "value", "min": ends[0], "max": ends[-1], "interval": step})
         return y_axis(name, {"type": "value", "min": 0})
     return y_axis(f"{name} (log scale)", log_axis(known, room=room))
 

@@ -34,7 +34,6 @@ def test_every_page_has_a_text_from_the_start_and_is_linked_from_every_page(
     root = assert_sound(client.get(f"/{name}/"))
     assert root.one("h1").text == texts.PAGES[name].title
     assert len(root.one("main").text) > 100
-    assert "This is the text that comes with the software." in root.one("main").text
     for address in ("/", "/docs/", "/nowhere/", "/accounts/login/"):
         footer = html.page(client.get(address)).one("footer")
         assert f"/{name}/" in [a.attributes["href"] for a in footer.all("a")]
