@@ -18,6 +18,7 @@ from leaderboard.models import (
     Status,
     Submission,
     Team,
+    User,
 )
 from tests import builders, pages
 from tests.editions import extended, open_edition, publish
@@ -54,6 +55,10 @@ def test_every_page_is_sound(keeper: Client, rescored: Edition, address: str) ->
 def test_desk_shows_each_split_with_its_board_and_what_is_prepared(keeper: Client, second: Edition) -> None:
     root = get(keeper, HUB)
     assert [h2.text for h2 in root.all("h2")] == ["Test", "Validation", "Demo"]
+    # Django's administration shows nothing to a maintainer who is no superuser.
+    assert "administration" in root.one("main").text
+    User.objects.update(is_superuser=False)
+    assert "administration" not in main_text(keeper, HUB)
     test, val, _ = (section.text for section in root.all("section", class_="desk"))
     assert "edition 1 published" in test
     assert "Edition 2 draft since" in test
