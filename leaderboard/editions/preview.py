@@ -1,4 +1,4 @@
-"""What an edition in preparation would change, before it is published."""
+"""What an edition in preparation would change, and what the published one changed."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -58,10 +58,10 @@ class Change:
 
 @dataclass(frozen=True)
 class Preview:
-    """All changes that publishing would make."""
+    """All changes that publishing makes."""
 
     edition: Edition
-    published: Edition
+    published: Edition  # which it replaces, or replaced
     changes: tuple[Change, ...]
     progress: corrections.RescoringProgress
     truth: history.TruthChange | None  # between the two; None if these were never compared
@@ -109,8 +109,14 @@ class Preview:
 
 
 def preview(edition: Edition) -> Preview:
-    """Compare an edition with the published one, by change of rank. Raises `Refused` without one."""
+    """Compare an edition with the published one, by change of rank. Raises `Refused` without one.
+
+    The published edition is compared with the one that it replaced, or, as the first, with itself.
+    """
     published = edition.split.current_edition
+    if published is not None and published.pk == edition.pk:
+        latest = history.latest_change(edition.split)
+        published = (latest and latest.replaced) or published
     if published is None:
         raise Refused(
             "edition-refused", f"The split {edition.split_id!r} has no published edition to compare with."

@@ -18,7 +18,7 @@ from leaderboard.editions import corrections, history, preview, splits
 from leaderboard.errors.refusals import NotMaintainer
 from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, Team, User
 from leaderboard.pages import texts
-from leaderboard.web.boards import edition_tables
+from leaderboard.web.boards import edition_tables, tables
 from leaderboard.web.decorators import asks_first
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain import queue_tables
@@ -100,7 +100,14 @@ def open_edition(request: HttpRequest, split: str) -> HttpResponse:
 @require_safe
 def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
     row = _edition(split, number)
-    context = {**_comparison(row), "predecessor": corrections.predecessor(row.split)}
+    past = history.record_of(row)
+    context = {
+        **_comparison(row),
+        "predecessor": corrections.predecessor(row.split),
+        "past": past,
+        "change": edition_tables.past_change(past),
+        "ttc_ranges": tables.counted_ranges(row.rules, row.ground_truth.counts),
+    }
     return render(request, "maintain/edition.html", context)
 
 

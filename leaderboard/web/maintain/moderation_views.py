@@ -214,7 +214,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
 @require_safe
 def team(request: HttpRequest, team_id: UUID) -> HttpResponse:
     row = get_object_or_404(Team, pk=team_id)
-    sent = Submission.objects.filter(method__team=row).select_related("method")
+    sent = Submission.objects.filter(method__team=row).select_related("method", "split")
     context = {
         "team": row,
         "members": row.memberships.select_related("user").order_by("joined_at"),

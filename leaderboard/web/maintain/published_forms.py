@@ -34,7 +34,7 @@ def _text(label: str, help_text: str = "", *, is_required: bool = True, **attrs:
 
 def _replacing() -> forms.BooleanField:
     return forms.BooleanField(
-        label="Replace", required=False, help_text="Put it in the place of a row with the same slug."
+        label="Replace", required=False, help_text="Takes the place of the row of the same method."
     )
 
 

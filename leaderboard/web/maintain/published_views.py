@@ -29,7 +29,7 @@ def remove(request: HttpRequest, split: str, slug: str) -> HttpResponse:
                 actor=maintainer_of(request),
                 **form.cleaned_data,
             )
-            messages.success(request, f"The row {row.method_name} of {split} was removed.")
+            messages.success(request, f"{row.method_name} was removed from {row.split.title}.")
             return redirect("maintain_published")
     return form_page(request, "maintain/published_remove.html", form, row=row)
 
@@ -56,8 +56,8 @@ def published(request: HttpRequest) -> HttpResponse:
                 is_replacing=form.cleaned_data["is_replacing"],
                 actor=maintainer_of(request),
             )
-            words = (f"{len(names)} {outcome}" for outcome, names in vars(done).items())
-            messages.success(request, f"Rows: {', '.join(words)}.")
+            words = (f"{len(names)} {outcome}" for outcome, names in vars(done).items() if names)
+            messages.success(request, f"Rows: {', '.join(words) or 'none'}.")
             return redirect("maintain_published")
     return form_page(request, "maintain/published.html", form, **context)
 

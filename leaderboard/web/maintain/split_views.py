@@ -29,7 +29,14 @@ from leaderboard.web.maintain.split_forms import AnnouncementForm, NewSplitForm,
 def splits(request: HttpRequest) -> HttpResponse:
     now = timezone.now()
     rows = [
-        (split, admissions.sentence_of(split, now=now) or "Open.", quota_tables.sentence_of(split))
+        (
+            split,
+            (admissions.sentence_of(split, now=now) or "Open.")
+            if split.has_ground_truth
+            else "No ground truth yet.",
+            split.announcement_at(now),
+            quota_tables.sentence_of(split),
+        )
         for split in Split.objects.select_related("current_edition")
     ]
     return render(request, "maintain/splits.html", {"rows": rows})
@@ -41,7 +48,7 @@ def add(request: HttpRequest) -> HttpResponse:
     if form.is_valid():
         with form.refusals():
             split = new_splits.add_split(now=timezone.now(), actor=maintainer_of(request), **form.wanted())
-            messages.success(request, f"The split {split.pk} was added.")
+            messages.success(request, f"{split.title} was added.")
             return redirect("maintain_splits")
     return form_page(request, "maintain/split_form.html", form)
 
@@ -53,7 +60,7 @@ def change(request: HttpRequest, split: str) -> HttpResponse:
     if form.is_valid():
         with form.refusals():
             policy.change(split_name=split, policy=form.policy(), actor=maintainer_of(request))
-            messages.success(request, f"The split {split} was changed.")
+            messages.success(request, f"{split_row.title} was changed.")
             return redirect("maintain_splits")
     return form_page(request, "maintain/split_form.html", form, split=split_row)
 

@@ -314,6 +314,7 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
     lines = pages.page(visitor.get("/board/val/")).all("p", class_="announcement")
     assert [line.text for line in lines] == [text, "Validation: Val only"]
     assert "Val only" not in visitor.get("/board/test/").text
+    assert "Announced: Val only" in pages.get(keeper, "/maintain/splits/").one("main").text
     # Its end comes: the next sweep tells remembered pages.
     later = timezone.now() - timedelta(seconds=1)
     Split.objects.filter(pk="val").update(announcement_ends_at=later)

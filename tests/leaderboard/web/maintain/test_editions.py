@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from leaderboard.models import (
     Status,
     Submission,
     Team,
+    User,
 )
 from tests import builders, pages
 from tests.editions import extended, open_edition, publish
@@ -53,6 +55,10 @@ def test_every_page_is_sound(keeper: Client, rescored: Edition, address: str) ->
 def test_desk_shows_each_split_with_its_board_and_what_is_prepared(keeper: Client, second: Edition) -> None:
     root = get(keeper, HUB)
     assert [h2.text for h2 in root.all("h2")] == ["Test", "Validation", "Demo"]
+    # Django's administration shows nothing to a maintainer who is no superuser.
+    assert "administration" in root.one("main").text
+    User.objects.update(is_superuser=False)
+    assert "administration" not in main_text(keeper, HUB)
     test, val, _ = (section.text for section in root.all("section", class_="desk"))
     assert "edition 1 published" in test
     assert "Edition 2 draft since" in test
@@ -133,6 +139,25 @@ def test_comparison_is_the_previews_line_by_line(keeper: Client, rescored: Editi
             assert cell.one("span", class_="delta").text == (f"{delta:+.1f}" if delta else "0.0").replace(
                 "-", "−"
             )
+
+
+def test_the_current_edition_shows_its_contents_who_published_it_and_its_changes(
+    keeper: Client, rescored: Edition
+) -> None:
+    first = main_text(keeper, FIRST)
+    assert "The first edition replaced no other." in first
+    assert "Publish" not in first.replace("Published", "")
+    publish(rescored)
+    root = get(keeper, SECOND)
+    assert totals(root)["labels changed"] == "5"
+    assert rescored.ground_truth.digest in root.text
+    assert re.search(r"UTC by (the command line|\S+@\S+): ", root.text)
+    assert "Changes from edition 1" in root.text
+    assert "Publish again" not in root.text
+    assert preview.preview(rescored).replaces == 1
+    former = main_text(keeper, FIRST)
+    assert "Changes from edition 2 if published again" in former
+    assert "Publish again…" in former
 
 
 def test_entries_that_become_rejected_say_why(

@@ -86,10 +86,10 @@ def wrong(client: Client, where: str, data: dict[str, str]) -> list[str]:
 
 def test_every_split_shows_its_rules(keeper: Client, team: Team) -> None:
     root = get(keeper, QUOTAS)
-    assert [row[:1] + row[2:6] for row in cells(root, "Rules")] == [
-        ["test", "3", "30 days", "24 hours", "20"],
-        ["val", "50", "24 hours", "–", "20"],
-        ["demo", "20", "24 hours", "–", "20"],
+    assert [row[:5] for row in cells(root, "Rules")] == [
+        ["Test test", "3", "30 days", "24 hours", "20"],
+        ["Validation val", "50", "24 hours", "–", "20"],
+        ["Demo demo", "20", "24 hours", "–", "20"],
     ]
     assert "No overrides." in root.one("main").text
 
@@ -150,11 +150,11 @@ def test_team_shows_what_it_has_left_on_every_split(
     test, val, _ = cells(get(keeper, address(team)), f"Quotas of {team.name}")
     next_at = Submission.objects.get().submitted_at + timedelta(hours=24)
     assert test[:6] == [
-        *("test", RULES_OF_TEST),
+        *("Test", RULES_OF_TEST),
         *("1", "2", f"{next_at:%Y-%m-%d %H:%M} UTC", "0"),
     ]
     assert val[:6] == [
-        *("val", "50 submissions within 24 hours; 20 rejected or cancelled files within 24 hours"),
+        *("Validation", "50 submissions within 24 hours; 20 rejected or cancelled files within 24 hours"),
         *("0", "50", "now", "0"),
     ]
 
