@@ -85,12 +85,7 @@ def template(request: HttpRequest, split: str) -> HttpResponseBase:
 
 @own_page
 def submission_list(request: HttpRequest) -> HttpResponse:
-    evaluations = Evaluation.objects.select_related("edition").prefetch_related("scores")
-    sent = (
-        Submission.objects.of(cast("User", request.user))
-        .select_related("method", "split", "submitted_by")
-        .prefetch_related(Prefetch("evaluations", evaluations))
-    )
+    sent = search.of_teams(cast("User", request.user))
     form = SearchForm.of(request)
     page = Paginator(search.matching(sent, **form.wanted()), PER_PAGE).get_page(request.GET.get("page"))
     table = result_tables.submission_table(page)

@@ -1,5 +1,6 @@
 """A method's page."""
 
+import html
 import re
 from pathlib import Path
 
@@ -146,3 +147,17 @@ def test_nearby_differences_have_their_intervals_once_a_worker_has_computed_them
     gaps.append(pages.get(client, address).one("table", class_="gaps").text)
     assert ["computing…" in text for text in gaps] == [True, False]
     assert re.search(r"Bar[0-9.]+−[0-9.]+−[0-9.]+ to −[0-9.]+", gaps[1])
+
+
+def test_own_method_offers_the_next_submission_and_lists_the_rejected_ones(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
+    sent = builders.submit(owner, b"[]", method="Night & day", visibility="PRIVATE")
+    builders.score_all()
+    main = pages.get(signed_in, f"/methods/{sent.method_id}/").one("main")
+    (button,) = [a for a in main.all("a") if a.text == "Submit again"]
+    assert [row.all("td")[3].text for row in main.one("tbody").all("tr")] == [
+        "rejectedThe outermost value is a list"
+    ]
+    form = pages.get(signed_in, html.unescape(button.attributes["href"])).one("form", id="submit")
+    assert form.one("input", name="method").attributes["value"] == "Night & day"
