@@ -21,6 +21,8 @@ from django.views.decorators.cache import cache_control
 from django.views.decorators.http import require_safe
 
 from evaluator.predictions import writing
+from leaderboard.boards import results
+from leaderboard.boards.snapshots import splits_of
 from leaderboard.editions import history
 from leaderboard.http_caching import is_known
 from leaderboard.models import Evaluation, Status, Submission, User, Visibility
@@ -88,8 +90,15 @@ def submission_list(request: HttpRequest) -> HttpResponse:
     sent = search.of_teams(cast("User", request.user))
     form = SearchForm.of(request)
     page = Paginator(search.matching(sent, **form.wanted()), PER_PAGE).get_page(request.GET.get("page"))
-    table = result_tables.submission_table(page)
-    return render(request, "submissions/submissions.html", {"page": page, "table": table, "form": form})
+    boards = results.own_rows(viewer=cast("User", request.user), splits=splits_of(request)) if page else []
+    context = {
+        "page": page,
+        "table": result_tables.submission_table(page),
+        "form": form,
+        "bests": [result_tables.best_of_team(board) for board in boards],
+        "comparable": {entry.submission_id for board in boards for entry in board.own},
+    }
+    return render(request, "submissions/submissions.html", context)
 
 
 @own_page
