@@ -29,7 +29,7 @@ class Command(AccountCommand):
             kind=MailKind.ACCOUNT,
             user=user,
             key=f"second-factor-reset:{event.pk}",
-            subject="Two-factor authentication is off",
+            subject=f"[{name}] Two-factor authentication is off",
             text=text,
             now=timezone.now(),
         )
