@@ -66,7 +66,7 @@ def test_a_row_that_is_removed_leaves_the_board_and_stays_on_those_of_the_past(
     quote("later", mid=1.0)
     at = timezone.now()
     before, page = representations(Client(), at), f"{PAGE}test/later/remove/"
-    assert "Remove Later from the test board" in assert_sound(keeper.get(page)).one("main").text
+    assert "Remove Later from the Test board" in assert_sound(keeper.get(page)).one("main").text
     assert keeper.post(page, {"reason": " "}).status_code == 422
     assert "Later" in on_board()
     assert keeper.post(page, {"reason": "Withdrawn by its authors."}).status_code == 302

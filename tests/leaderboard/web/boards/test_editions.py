@@ -155,7 +155,7 @@ def test_changelog_tells_every_change_with_its_reason(client: Client, replaced: 
 
 def test_split_without_an_edition_says_so_and_leads_onward(client: Client, edition: Edition) -> None:
     main = get(client, "/board/val/editions/").one("main")
-    assert "No edition of val has been published yet. When one is, this page will say" in main.text
+    assert "No edition of Validation has been published yet. When one is, this page will say" in main.text
     onward = [a.attributes["href"] for a in main.one("ul").all("a")]
     assert onward == ["/board/val/", "/board/test/editions/", "/docs/editions/", "/docs/changelog/"]
     assert client.get("/board/nowhere/editions/").status_code == 404

@@ -146,7 +146,7 @@ def test_the_front_is_what_nothing_beats_in_both(client: Client, entries: list[S
 def test_a_board_with_nothing_to_draw_says_so_and_has_no_empty_chart(client: Client, benchmark: None) -> None:
     root = get(client, "/board/demo/charts/")
     assert root.all("figure") == []
-    assert "There are no results on demo yet." in root.one("main").text
+    assert "There are no results on Demo yet." in root.one("main").text
     assert client.get("/board/nowhere/charts/").status_code == 404
 
 
