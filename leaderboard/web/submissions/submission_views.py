@@ -188,8 +188,8 @@ def analysis(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     if progress.is_final and progress.state != Status.SCORED:
         raise Http404("This submission has no score.")
     closer = analyses.for_submission(submission=row, viewer=request.user)
-    best = analyses.best_curve(split=row.split, besides=row.method) if closer else None
-    tables = analysis_charts.error_analysis_tables(closer, best) if closer else None
+    references = analyses.reference_curves(split=row.split, besides=row.method) if closer else []
+    tables = analysis_charts.error_analysis_tables(closer, references) if closer else None
     return render(
         request, "submissions/analysis.html", {"submission": row, "tables": tables, "closer": closer}
     )
