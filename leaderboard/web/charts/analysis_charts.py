@@ -84,7 +84,11 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric], references: Sequence[Re
     has_intervals = any(_interval(row, metric) for row in bins for metric in errors)
     of_bin = [{(row["low_s"], row["high_s"]): row for row in others} for _, _, others in references]
     drawn = [row for rows in (*(others for _, _, others in references), bins) for row in rows]
-    names = [f"{label}: {entry.method}" for label, entry, _ in references]
+    # A key of the chart is too short to show dashes.
+    names = [
+        f"{label}{how}: {entry.method}"
+        for how, (label, entry, _) in zip(("", " (dashed)"), references, strict=False)
+    ]
     frame = Frame(
         x_axes=[x_axis("True time to contact in s", _TTC_AXIS) for _ in errors],
         y_axes=[error_axis(metric, _ends(drawn, metric)) for metric in errors],

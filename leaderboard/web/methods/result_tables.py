@@ -80,13 +80,15 @@ def method_result(result: Result, pairs: Sequence[Pair]) -> dict[str, Any]:
     entry, gaps = result.entry, [gap_of(pair) for pair in pairs]
     gap = next((each for each in gaps if result.best and each.other.id == result.best.id), None)
     values = [attempt.value for attempt in reversed(result.attempts) if attempt.value is not None]
+    # Of an anonymous method only days are known, and no order within a day.
+    is_ordered = len({attempt.at for attempt in result.attempts}) == len(result.attempts)
     return {
         "result": result,
         "table": edition_table(entry, result.edition),
         "card": score_card(entry, result.rows, n_ranked=result.n_ranked, gap=gap),
         "gaps": gaps,
         "rank_words": "" if entry.is_visible_to_all else "Rank if public",
-        "history": whiskers.sparkline(values) if len(values) > 1 else "",
+        "history": whiskers.sparkline(values) if len(values) > 1 and is_ordered else "",
         "rank_range": rank_range(entry),
         "errors": result.edition.rules.metrics,
         "attempts": [
