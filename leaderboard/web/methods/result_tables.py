@@ -87,7 +87,6 @@ def method_result(result: Result, pairs: Sequence[Pair]) -> dict[str, Any]:
         "table": edition_table(entry, result.edition),
         "card": score_card(entry, result.rows, n_ranked=result.n_ranked, gap=gap),
         "gaps": gaps,
-        "rank_words": "" if entry.is_visible_to_all else "Rank if public",
         "history": whiskers.sparkline(values) if len(values) > 1 and is_ordered else "",
         "rank_range": rank_range(entry),
         "errors": result.edition.rules.metrics,
