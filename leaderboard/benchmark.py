@@ -107,6 +107,7 @@ class Benchmark(_Table, frozen=True):
     dataset: Dataset
     site_name: str = ""
     keywords: tuple[Text, ...] = ()
+    baseline: Text = ""  # the beginning of its name on boards
     paper: Paper | None = None
     figure: Figure | None = None
     splits: tuple[FirstSplit, ...] = ()

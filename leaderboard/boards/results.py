@@ -37,6 +37,32 @@ class Result:
         return tuple({other.id: other for other in (*first, *self.neighbours)}.values())
 
 
+@dataclass(frozen=True)
+class OwnRows:
+    """The rows with a value that a reader's team has on one published board, the best first."""
+
+    split: Split
+    rows: tuple[Entry, ...]  # those that everybody sees
+    own: tuple[Entry, ...]  # never empty
+
+    @property
+    def n_ranked(self) -> int:
+        """Return the number of ranks, with the best of one's own among them."""
+        return sum(row.rank is not None for row in self.rows) + (not self.own[0].is_visible_to_all)
+
+
+def own_rows(*, viewer: User, splits: Sequence[Split]) -> list[OwnRows]:
+    """Return the rows of a reader's team on each board where it has any."""
+    boards = []
+    for split, drawn in snapshots.shown_on(splits):
+        entries = listing.with_own(drawn.entries, split=split, edition=split.current_edition, viewer=viewer)
+        own = [entry for entry in entries if entry.is_mine and entry.value is not None]
+        if own:
+            own.sort(key=lambda entry: entry.value or 0.0)
+            boards.append(OwnRows(split, drawn.entries, tuple(own)))
+    return boards
+
+
 def results(
     *, method: Method, viewer: User | AnonymousUser, splits: Sequence[Split] | None = None
 ) -> tuple[Result, ...]:

@@ -30,9 +30,12 @@ CLOSES_WITHIN: Final = timedelta(days=3)
 _OVERLAP: Final = timedelta(minutes=10)
 _NEWS: Final = timedelta(days=1)
 _OUTCOMES: Final = {
-    Status.SCORED: "is scored",
-    Status.REJECTED: "is rejected: the file has problems, which the page lists",
-    Status.SYSTEM_ERROR: "could not be scored: a system error, which the maintainers see",
+    Status.SCORED: ("was scored", "See the result:"),
+    Status.REJECTED: ("was rejected", "See the problems in the file:"),
+    Status.SYSTEM_ERROR: (
+        "could not be scored",
+        "This is an error on our side. A maintainer will retry it; you don't need to submit the file again.",
+    ),
 }
 
 
@@ -90,23 +93,25 @@ def _scored(since: datetime, now: datetime) -> Iterator[Mail]:
             # Whoever has left the team is told nothing of it any more.
             submission__method__team__members=F("submission__submitted_by"),
         )
-        .select_related("submission__method", "submission__submitted_by")
+        .select_related("submission__method", "submission__split", "submission__submitted_by")
         .order_by("finished_at")
     )
     for evaluation in decided:
         submission = evaluation.submission
-        outcome = _OUTCOMES[Status(evaluation.status)]
+        outcome, what_next = _OUTCOMES[Status(evaluation.status)]
+        name, split = submission.method.name, submission.split.title
         text = (
-            f"Your submission of {submission.method.name} to {submission.split_id} {outcome}.\n\n"
+            f"Your submission of {name} to {split} {outcome}. {what_next}\n\n"
             f"{_link('submission', submission.pk)}"
         )
-        subject = f"{submission.method.name} on {submission.split_id} {outcome.partition(':')[0]}"
+        subject = f"{name} on {split} {outcome}"
         key = f"scored:{submission.pk}"
         yield _mail(MailKind.SCORED, submission.submitted_by, key=key, subject=subject, text=text, now=now)
 
 
 def _editions(since: datetime, now: datetime) -> Iterator[Mail]:
-    for publication in Publication.objects.filter(at__gt=since, at__lte=now).exclude(replaced=None):
+    publications = Publication.objects.filter(at__gt=since, at__lte=now).exclude(replaced=None)
+    for publication in publications.select_related("split"):
         scored = Submission.objects.filter(
             withdrawn_at=None, evaluations__edition=publication.replaced, evaluations__status=Status.SCORED
         )
@@ -116,14 +121,14 @@ def _editions(since: datetime, now: datetime) -> Iterator[Mail]:
         names: defaultdict[int, set[str]] = defaultdict(set)
         for user_id, name in rows.distinct():
             names[user_id].add(name)
+        subject = f"The {publication.split.title} board has a new edition"
         for user in readers(MailKind.EDITION).filter(pk__in=names):
             listed = "\n".join(f"  {name}" for name in sorted(names[user.pk]))
             text = (
-                f"The board of {publication.split_id} is now edition {publication.edition.number}.\n"
-                f"Reason: {publication.reason}\n\nYour team has these entries there:\n{listed}\n\n"
-                f"What changed, and what became of each: {_link('editions', publication.split_id)}"
+                f"{subject}: edition {publication.edition.number}.\nReason: {publication.reason}\n\n"
+                f"Your team's methods on it:\n{listed}\n\n"
+                f"See what changed:\n\n{_link('editions', publication.split_id)}"
             )
-            subject = f"The board of {publication.split_id} has a new edition"
             key = f"edition:{publication.pk}"
             yield _mail(MailKind.EDITION, user, key=key, subject=subject, text=text, now=now)
 
@@ -140,7 +145,7 @@ def _tokens(now: datetime) -> Iterator[Mail]:
     for token in ending.select_related("user"):
         text = (
             f"Your API token {token.name} expires on {token.expiry:%Y-%m-%d at %H:%M} UTC. After that, the "
-            f"site refuses programs that use it. Create a new token before then: {_link('tokens')}"
+            f"site refuses programs that use it. Create a new token before then:\n\n{_link('tokens')}"
         )
         subject = f"Your API token {token.name} expires on {token.expiry:%Y-%m-%d}"
         key = f"token:{token.digest[:40]}"
@@ -150,10 +155,10 @@ def _tokens(now: datetime) -> Iterator[Mail]:
 def _deadlines(now: datetime) -> Iterator[Mail]:
     for split in Split.objects.filter(closes_at__gt=now, closes_at__lte=now + CLOSES_WITHIN):
         at = f"{split.closes_at:%Y-%m-%d at %H:%M} UTC"
-        text = f"{split.pk} closes on {at}. After that it takes no more files.\n\n{_link('board', split.pk)}"
+        subject = f"Submissions to {split.title} close on {at}"
+        text = f"{subject}. Send your last files before then:\n\n{_link('submit')}?split={split.pk}"
         for user in readers(MailKind.DEADLINE).filter(has_sent_to(split)):
             key = f"deadline:{split.pk}:{split.closes_at:%Y%m%d%H%M}"
-            subject = f"{split.pk} closes on {at}"
             yield _mail(MailKind.DEADLINE, user, key=key, subject=subject, text=text, now=now)
 
 

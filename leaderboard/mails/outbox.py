@@ -10,8 +10,10 @@ from datetime import datetime, timedelta
 from typing import Final
 
 import structlog
+from django.conf import settings
 from django.core.mail import EmailMessage
 from django.db.models import F
+from django.urls import reverse
 
 from leaderboard.models import Mail, MailKind, User
 
@@ -75,7 +77,8 @@ def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) 
         mine = Mail.objects.filter(pk=mail.pk, n_tries=mail.n_tries, ended_at=None)
         if not mine.update(n_tries=F("n_tries") + 1, due_at=now + wait):
             continue  # somebody else sends it
-        is_sent = _sent(EmailMessage(mail.subject, mail.text, to=[mail.recipient]))
+        message = EmailMessage(mail.subject, mail.text, to=[mail.recipient], headers=_headers(mail))
+        is_sent = _sent(message)
         n_sent += is_sent
         if is_sent or mail.queued_at <= now - GIVE_UP_AFTER:
             _end(mail, now=now, is_sent=is_sent)
@@ -87,6 +90,16 @@ def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) 
 def purge(*, now: datetime) -> int:
     """Delete mails that were sent long ago. Returns how many."""
     return Mail.objects.filter(ended_at__lt=now - KEPT).delete()[0]
+
+
+def _headers(mail: Mail) -> dict[str, str]:
+    """Return what mail clients offer to unsubscribe by; nobody can from mails of accounts."""
+    if mail.kind == MailKind.ACCOUNT:
+        return {}
+    return {
+        "List-Unsubscribe": f"<{settings.SITE_URL}{reverse('mails')}>",
+        "Auto-Submitted": "auto-generated",
+    }
 
 
 def _end(mail: Mail, *, now: datetime, is_sent: bool) -> None:

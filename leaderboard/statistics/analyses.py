@@ -7,6 +7,7 @@ from typing import Any
 from uuid import UUID
 
 import numpy as np
+from django.conf import settings
 from django.contrib.auth.models import AnonymousUser
 from django.db import transaction
 from django.db.models import QuerySet
@@ -54,22 +55,32 @@ def curves(*, edition: Edition, evaluations: Collection[UUID]) -> dict[UUID, lis
     return dict(rows.values_list("evaluation_id", "content__curve"))
 
 
-def best_curve(*, split: Split, besides: Method) -> tuple[Entry, list[dict[str, Any]]] | None:
-    """Return the best public row of an open board but for one method, and its curve; None if not known."""
+def reference_curves(*, split: Split, besides: Method) -> list[tuple[str, Entry, list[dict[str, Any]]]]:
+    """Return public rows of an open board but for one method, each with its label and curve, if known.
+
+    They are the best row, and the best of those that have the name of the benchmark's baseline.
+    """
     board = snapshots.board(split=split, viewer=AnonymousUser())
     if board.edition is None:
-        return None
+        return []
     board.edition.split = board.split  # it is at hand
     ranked = [
         entry
         for entry in board.entries
         if entry.evaluation_id and entry.rank and entry.method_id != besides.pk
     ]
-    best = min(ranked, key=lambda entry: entry.rank or 0, default=None)
-    if best is None or best.evaluation_id is None:
-        return None
-    curve = curves(edition=board.edition, evaluations=[best.evaluation_id]).get(best.evaluation_id)
-    return (best, curve) if curve else None
+    ranked.sort(key=lambda entry: entry.rank or 0)
+    baseline = settings.BENCHMARK.baseline
+    named = [entry for entry in ranked[1:] if baseline and entry.method.startswith(baseline)]
+    chosen = {"Best row": ranked[:1], "Baseline": named[:1]}
+    ids = [entry.evaluation_id for rows in chosen.values() for entry in rows if entry.evaluation_id]
+    known = curves(edition=board.edition, evaluations=ids)
+    return [
+        (label, entry, known[entry.evaluation_id])
+        for label, rows in chosen.items()
+        for entry in rows
+        if entry.evaluation_id in known
+    ]
 
 
 # --- a worker's work -------------------------------------------------------------------------------------

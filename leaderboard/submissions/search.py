@@ -2,13 +2,23 @@
 
 from uuid import UUID
 
-from django.db.models import Case, F, OuterRef, Q, QuerySet, Subquery, When
+from django.db.models import Case, F, OuterRef, Prefetch, Q, QuerySet, Subquery, When
 
-from leaderboard.models import Evaluation, Status, Submission
+from leaderboard.models import Evaluation, Status, Submission, User
 
 WITHDRAWN = "WITHDRAWN"
 STATES = (*((str(each.value), str(each.label)) for each in Status), (WITHDRAWN, "withdrawn"))
 """What a submission can be asked for by: the status of the evaluation that speaks for it, or withdrawn."""
+
+
+def of_teams(user: User) -> "QuerySet[Submission]":
+    """Return the submissions of a person's teams, with what a list of them shows."""
+    evaluations = Evaluation.objects.select_related("edition").prefetch_related("scores")
+    return (
+        Submission.objects.of(user)
+        .select_related("method", "split", "submitted_by")
+        .prefetch_related(Prefetch("evaluations", evaluations))
+    )
 
 
 def matching(

@@ -11,9 +11,9 @@ from leaderboard.models import MailKind
 from leaderboard.people import second_factor
 
 _MAIL = (
-    "A maintainer removed the second factor and the recovery codes of your account: you sign in without "
-    "it again. If you did not ask for this, tell us at once: {contact}\n\n"
-    "Set up a new second factor here: {site}/accounts/2fa/\n\n--\n{name}\n{site}"
+    "A maintainer switched off two-factor authentication for your account and deleted its recovery codes. "
+    "If you did not ask for this, write to us now: {contact}\n\n"
+    "Set it up again here:\n\n{site}/accounts/2fa/\n\n--\n{name}\n{site}"
 )
 
 
@@ -29,7 +29,7 @@ class Command(AccountCommand):
             kind=MailKind.ACCOUNT,
             user=user,
             key=f"second-factor-reset:{event.pk}",
-            subject="Two-factor authentication is off",
+            subject=f"[{name}] Two-factor authentication is off",
             text=text,
             now=timezone.now(),
         )

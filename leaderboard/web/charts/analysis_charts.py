@@ -37,11 +37,12 @@ MEAN, SPAN = "Mean error", "95% confidence interval"
 MISSED, FALSE = "Missed warnings", "False alarms"
 SHARE: Final = "Share of sequences"
 Row = Mapping[str, Any]
-Reference = tuple[Entry, Sequence[Row]]
+Reference = tuple[str, Entry, Sequence[Row]]
+_DASHES: Final = ("solid", "dashed")  # of the reference curves
 
 
-def error_analysis_tables(closer: Analysis, best: Reference | None) -> dict[str, Any]:
-    """Return the charts and tables of an analysis; `best` is a row of the board to compare with."""
+def error_analysis_tables(closer: Analysis, references: Sequence[Reference]) -> dict[str, Any]:
+    """Return the charts and tables of an analysis; `references` are rows of the board to compare with."""
     content, distribution = closer.content, closer.content["distribution"]
     rules = closer.evaluation.edition.rules
     errors = [metric for metric in rules.metrics if metric.name in distribution]
@@ -49,7 +50,7 @@ def error_analysis_tables(closer: Analysis, best: Reference | None) -> dict[str,
     return {
         "n_sequences": counted(content["n_sequences"], "sequence"),
         "n_recordings": counted(content["n_recordings"], "recording"),
-        "curve": curve(content["curve"], errors, best),
+        "curve": curve(content["curve"], errors, references),
         "histogram": histogram(content["histogram"], rules.primary),
         "primary": rules.primary.symbol,
         "errors": errors,
@@ -76,22 +77,27 @@ def error_analysis_tables(closer: Analysis, best: Reference | None) -> dict[str,
 # --- error by time to contact ----------------------------------------------------------------------------
 
 
-def curve(bins: Sequence[Row], errors: Sequence[Metric], best: Reference | None = None) -> Chart:
-    """Draw mean errors by true TTC with confidence intervals, and those of the best row in grey."""
+def curve(bins: Sequence[Row], errors: Sequence[Metric], references: Sequence[Reference] = ()) -> Chart:
+    """Draw mean errors by true TTC with confidence intervals, and those of other rows in grey."""
     if not bins:
         return empty("curve")
     has_intervals = any(_interval(row, metric) for row in bins for metric in errors)
-    name, best_bins = (f"Best row: {best[0].method}", best[1]) if best else ("", ())
-    best_of_bin = {(row["low_s"], row["high_s"]): row for row in best_bins}
-    drawn = [*best_bins, *bins]
+    of_bin = [{(row["low_s"], row["high_s"]): row for row in others} for _, _, others in references]
+    drawn = [row for rows in (*(others for _, _, others in references), bins) for row in rows]
+    # A key of the chart is too short to show dashes.
+    names = [
+        f"{label}{how}: {entry.method}"
+        for how, (label, entry, _) in zip(("", " (dashed)"), references, strict=False)
+    ]
     frame = Frame(
         x_axes=[x_axis("True time to contact in s", _TTC_AXIS) for _ in errors],
         y_axes=[error_axis(metric, _ends(drawn, metric)) for metric in errors],
         series=[
             *(
-                line(name, [(_middle(row), row[metric.name]) for row in run], "--quiet", grid=i)
+                line(name, [(_middle(row), row[metric.name]) for row in run], "--quiet", grid=i, dash=dash)
+                for name, dash, (_, _, others) in zip(names, _DASHES, references, strict=False)
                 for i, metric in enumerate(errors)
-                for run in _runs(best_bins)
+                for run in _runs(others)
             ),
             *(
                 series
@@ -100,10 +106,10 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric], best: Reference | None 
                 for series in _curve_series(run, metric, grid=i)
             ),
         ],
-        names=[MEAN, *([SPAN] if has_intervals else []), *([name] if best else [])],
+        names=[MEAN, *([SPAN] if has_intervals else []), *names],
     )
-    best_columns = [f"{metric.symbol} of {best[0].method}" for metric in errors] if best else []
-    columns = ("Time to contact in s", "Sequences", *(metric.heading for metric in errors), *best_columns)
+    others_columns = [f"{metric.symbol} of {entry.method}" for _, entry, _ in references for metric in errors]
+    columns = ("Time to contact in s", "Sequences", *(metric.heading for metric in errors), *others_columns)
     return Chart(
         kind="curve",
         label=f"Mean {' and '.join(metric.symbol for metric in errors)} by true time to contact.",
@@ -114,7 +120,12 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric], best: Reference | None 
                 _seconds(row),
                 grouped(row["n"]),
                 *(_value_words(row, metric) for metric in errors),
-                *(_best_words(best_of_bin.get((row["low_s"], row["high_s"])), errors) if best else ()),
+                *(
+                    format_rounded(others[key][metric.name] if key in others else None)
+                    for key in [(row["low_s"], row["high_s"])]
+                    for others in of_bin
+                    for metric in errors
+                ),
             )
             for row in bins
         ),
@@ -125,10 +136,6 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric], best: Reference | None 
 
 def _middle(row: Row) -> float:
     return float(row["low_s"] + row["high_s"]) / 2
-
-
-def _best_words(row: Row | None, errors: Sequence[Metric]) -> list[str]:
-    return [format_rounded(row[metric.name] if row else None) for metric in errors]
 
 
 def _interval(row: Row, metric: Metric) -> tuple[float, float] | None:

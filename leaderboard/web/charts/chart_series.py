@@ -85,10 +85,12 @@ def staircase(name: str, corners: Iterable[tuple[float, float]]) -> Option:
     }
 
 
-def line(name: str, points: Iterable[tuple[float, float]], ink: str, *, grid: int = 0) -> Option:
+def line(
+    name: str, points: Iterable[tuple[float, float]], ink: str, *, grid: int = 0, dash: str = "solid"
+) -> Option:
     series = staircase(name, points)
     del series["step"]
-    drawn = {"lineStyle": {"color": ink, "width": 1.5}, "itemStyle": {"color": ink}}
+    drawn = {"lineStyle": {"color": ink, "width": 1.5, "type": dash}, "itemStyle": {"color": ink}}
     return series | drawn | {"xAxisIndex": grid, "yAxisIndex": grid}
 
 

@@ -13,14 +13,17 @@ from leaderboard.boards import results, visibility_preview
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.http_caching import cacheable
 from leaderboard.methods import details, editing, visibility
-from leaderboard.models import Method, Split, Submission, User, Visibility
+from leaderboard.models import Method, User, Visibility
 from leaderboard.moderation import empty_methods
 from leaderboard.statistics import comparisons
+from leaderboard.submissions import search
 from leaderboard.web.boards import export_views
 from leaderboard.web.decorators import own_form
 from leaderboard.web.forms import ConfirmForm
 from leaderboard.web.methods.method_forms import MethodForm, ShowForm
-from leaderboard.web.methods.result_tables import edition_table, method_result
+from leaderboard.web.methods.result_tables import edition_table, method_result, submission_table
+
+N_LAST = 10
 
 
 @require_safe
@@ -30,7 +33,11 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
     achieved = results.results(method=row, viewer=request.user, splits=splits_of(request))
     profile = results.profile(method=row, viewer=request.user)
     is_mine = Method.objects.of(request.user).filter(pk=row.pk).exists()
-    sent_to = _sent_to(request, row) if is_mine and not achieved else None
+    last = []
+    if is_mine and not achieved:
+        sent = search.of_teams(cast("User", request.user)).filter(method=row)
+        last = list(sent.order_by("-submitted_at")[:N_LAST])
+    sent_to = last[0].split if last else None
     pairs = [comparisons.against(result.entry, result.rivals, edition=result.edition) for result in achieved]
     context = {
         "profile": profile,
@@ -43,6 +50,7 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
             method_result(result, of_result) for result, of_result in zip(achieved, pairs, strict=True)
         ],
         "sent_to": sent_to,
+        "table": submission_table(last),
         "board_split": achieved[0].split.pk if achieved else sent_to.pk if sent_to else "",
         **export_views.of_method(achieved),
     }
@@ -53,12 +61,6 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
 
 def _drawn(request: HttpRequest, context: dict[str, Any]) -> HttpResponse:
     return render(request, "methods/method.html", context)
-
-
-def _sent_to(request: HttpRequest, method: Method) -> Split | None:
-    sent = Submission.objects.of(cast("User", request.user)).filter(method=method).select_related("split")
-    last = sent.order_by("-submitted_at").first()
-    return last.split if last else None
 
 
 def _own(request: HttpRequest, method_id: UUID) -> Method:

@@ -12,7 +12,7 @@ from evaluator.metrics.protocol import OVERALL, grouped_names
 from evaluator.metrics.registry import Metric
 from evaluator.scoring.results import format_rounded
 from evaluator.tables import sentences
-from leaderboard.boards.results import Result
+from leaderboard.boards.results import OwnRows, Result
 from leaderboard.boards.rows import Entry, flat_scores
 from leaderboard.models import Edition, Evaluation, Status, Submission
 from leaderboard.statistics.comparisons import MIN_METHODS, Pair
@@ -27,7 +27,7 @@ from leaderboard.web.boards.score_columns import (
 )
 from leaderboard.web.boards.tables import rank_range
 from leaderboard.web.formatting import grouped
-from leaderboard.web.methods.score_cards import gap_of, score_card
+from leaderboard.web.methods.score_cards import gap_of, gap_to_best, score_card
 
 _MAX_REASON: Final = 110
 
@@ -80,13 +80,14 @@ def method_result(result: Result, pairs: Sequence[Pair]) -> dict[str, Any]:
     entry, gaps = result.entry, [gap_of(pair) for pair in pairs]
     gap = next((each for each in gaps if result.best and each.other.id == result.best.id), None)
     values = [attempt.value for attempt in reversed(result.attempts) if attempt.value is not None]
+    # Of an anonymous method only days are known, and no order within a day.
+    is_ordered = len({attempt.at for attempt in result.attempts}) == len(result.attempts)
     return {
         "result": result,
         "table": edition_table(entry, result.edition),
         "card": score_card(entry, result.rows, n_ranked=result.n_ranked, gap=gap),
         "gaps": gaps,
-        "rank_words": "" if entry.is_visible_to_all else "Rank if public",
-        "history": whiskers.sparkline(values) if len(values) > 1 else "",
+        "history": whiskers.sparkline(values) if len(values) > 1 and is_ordered else "",
         "rank_range": rank_range(entry),
         "errors": result.edition.rules.metrics,
         "attempts": [
@@ -110,6 +111,19 @@ def _compare_href(result: Result) -> str:
         return ""
     query = urlencode([("split", result.split.pk), *(("m", pk) for pk in ids)])
     return f"{reverse('compare')}?{query}"
+
+
+def best_of_team(board: OwnRows) -> dict[str, Any]:
+    """Return the best score of a team on one board, and where it is compared with the best of the others."""
+    entry = board.own[0]
+    gap = gap_to_best(entry, board.rows)
+    other = gap.other.method_id if gap else None
+    query = [("split", board.split.pk), *(("m", pk) for pk in (entry.method_id, other))]
+    return {
+        "split": board.split,
+        "card": score_card(entry, board.rows, n_ranked=board.n_ranked, gap=gap),
+        "compare_href": f"{reverse('compare')}?{urlencode(query)}" if other else "",
+    }
 
 
 def submission_table(submissions: Iterable[Submission]) -> dict[str, Any]:

@@ -82,6 +82,15 @@ def gap_of(pair: Pair) -> Gap:
     )
 
 
+def gap_to_best(entry: Entry, rows: Sequence[Entry]) -> Gap | None:
+    """Word the difference to the best other row, without its interval; None without another one."""
+    others = [row for row in rows if row.value is not None and row.method_id != entry.method_id]
+    if entry.value is None or not others:
+        return None
+    # A worker computes more for the pages of methods.
+    return gap_of(Pair(entry, min(others, key=lambda row: row.value or 0.0), None))
+
+
 def citation(card: ScoreCard, *, split: str, edition: int | None) -> str:
     """Word a score as one quotes it: value, interval, rank, and where it is from."""
     interval = f" [{card.interval.replace(' to ', ', ')}]" if card.interval else ""

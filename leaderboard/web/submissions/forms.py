@@ -77,7 +77,9 @@ class SubmissionForm(DetailsForm):
 
     def __init__(self, user: User, request: HttpRequest) -> None:
         sent = (request.POST, request.FILES) if request.method == "POST" else (None, None)
-        super().__init__(sent[0], sent[1], initial={"split": self._split_to_mark})
+        super().__init__(
+            sent[0], sent[1], initial={"split": self._split_to_mark, "method": request.GET.get("method", "")}
+        )
         self._user = user
         self._preferred = request.GET.get("split", "")
         self.max_bytes = settings.MAX_PREDICTIONS_BYTES

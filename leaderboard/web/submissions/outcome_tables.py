@@ -1,6 +1,6 @@
 """Tables of a submission's page: numbers, rank, comparison, a row for a paper."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 from urllib.parse import urlencode
 
@@ -14,14 +14,13 @@ from leaderboard.boards.rows import Entry
 from leaderboard.exports import tables
 from leaderboard.models import Submission, Visibility
 from leaderboard.quotas.usage import Quota
-from leaderboard.statistics.comparisons import Pair
 from leaderboard.submissions import outcomes
 from leaderboard.submissions.outcomes import BoardPosition
 from leaderboard.submissions.progress import Progress
 from leaderboard.web.boards.tables import rank_range
 from leaderboard.web.formatting import signed
 from leaderboard.web.methods.result_tables import result_table
-from leaderboard.web.methods.score_cards import Gap, citation, gap_of, score_card
+from leaderboard.web.methods.score_cards import citation, gap_to_best, score_card
 
 
 def outcome_table(
@@ -52,7 +51,7 @@ def outcome_table(
     )
     rows = board_position.rows if board_position else ()
     card = score_card(
-        entry, rows, n_ranked=board_position.n_ranked if board_position else 0, gap=_gap(entry, rows)
+        entry, rows, n_ranked=board_position.n_ranked if board_position else 0, gap=gap_to_best(entry, rows)
     )
     return {
         "table": result_table(entry, progress.counts),
@@ -70,15 +69,6 @@ def outcome_table(
         "latex": tables.latex_row(entry),
         "latex_order": _order_words(progress.scores),
     }
-
-
-def _gap(entry: Entry, rows: Sequence[Entry]) -> Gap | None:
-    others = [row for row in rows if row.value is not None and row.method_id != entry.method_id]
-    if entry.value is None or not others:
-        return None
-    best = min(others, key=lambda row: row.value or 0.0)
-    # The difference alone: a worker computes more for the pages of methods.
-    return gap_of(Pair(entry, best, None))
 
 
 def _order_words(names: Iterable[str]) -> str:

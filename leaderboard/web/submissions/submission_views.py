@@ -21,6 +21,8 @@ from django.views.decorators.cache import cache_control
 from django.views.decorators.http import require_safe
 
 from evaluator.predictions import writing
+from leaderboard.boards import results
+from leaderboard.boards.snapshots import splits_of
 from leaderboard.editions import history
 from leaderboard.http_caching import is_known
 from leaderboard.models import Evaluation, Status, Submission, User, Visibility
@@ -85,16 +87,18 @@ def template(request: HttpRequest, split: str) -> HttpResponseBase:
 
 @own_page
 def submission_list(request: HttpRequest) -> HttpResponse:
-    evaluations = Evaluation.objects.select_related("edition").prefetch_related("scores")
-    sent = (
-        Submission.objects.of(cast("User", request.user))
-        .select_related("method", "split", "submitted_by")
-        .prefetch_related(Prefetch("evaluations", evaluations))
-    )
+    sent = search.of_teams(cast("User", request.user))
     form = SearchForm.of(request)
     page = Paginator(search.matching(sent, **form.wanted()), PER_PAGE).get_page(request.GET.get("page"))
-    table = result_tables.submission_table(page)
-    return render(request, "submissions/submissions.html", {"page": page, "table": table, "form": form})
+    boards = results.own_rows(viewer=cast("User", request.user), splits=splits_of(request)) if page else []
+    context = {
+        "page": page,
+        "table": result_tables.submission_table(page),
+        "form": form,
+        "bests": [result_tables.best_of_team(board) for board in boards],
+        "comparable": {entry.submission_id for board in boards for entry in board.own},
+    }
+    return render(request, "submissions/submissions.html", context)
 
 
 @own_page
@@ -184,8 +188,8 @@ def analysis(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     if progress.is_final and progress.state != Status.SCORED:
         raise Http404("This submission has no score.")
     closer = analyses.for_submission(submission=row, viewer=request.user)
-    best = analyses.best_curve(split=row.split, besides=row.method) if closer else None
-    tables = analysis_charts.error_analysis_tables(closer, best) if closer else None
+    references = analyses.reference_curves(split=row.split, besides=row.method) if closer else []
+    tables = analysis_charts.error_analysis_tables(closer, references) if closer else None
     return render(
         request, "submissions/analysis.html", {"submission": row, "tables": tables, "closer": closer}
     )

@@ -173,7 +173,7 @@ def test_links_to_boards_and_methods_show_what_they_are(methods: list[Method], c
         ("/board/test/charts/", "Charts of Test"),
         ("/board/test/editions/", "Editions of Test"),
         (f"/methods/{first.pk}/", first.name),
-        (f"/compare/?m={first.pk}&m={second.pk}", "Comparison on test"),
+        (f"/compare/?m={first.pk}&m={second.pk}", "Comparison on Test"),
     ):
         head = pages.page(client.get(address)).one("head")
         properties = {

@@ -128,9 +128,10 @@ def test_a_file_sent_on_the_site_brings_one_mail_with_its_outcome(edition: Editi
     assert queue_due_mails() == [(owner.email, "scored")]
     outbox.work_off(now=timezone.now())
     [sent] = mail.outbox
-    assert sent.subject == "[TSTTC leaderboard] Foo on test is scored"
+    assert sent.subject == "[TSTTC leaderboard] Foo on Test was scored"
     assert f"/submissions/{submission.pk}/" in sent.body
     assert "Choose which emails you get: http://127.0.0.1:8000/mails/" in sent.body
+    assert sent.extra_headers["List-Unsubscribe"] == "<http://127.0.0.1:8000/mails/>"
     assert queue_due_mails() == []
 
 
@@ -182,7 +183,7 @@ def test_tokens_that_end_and_splits_that_close_bring_mails_to_those_concerned(
     builders.submit(owner, builders.predictions(edition))
     Split.objects.filter(pk="test").update(closes_at=now + 2 * DAY)
     assert queue_due_mails() == [(owner.email, "deadline"), (owner.email, "token")]
-    assert "closes on" in Mail.objects.get(kind="deadline").subject
+    assert "close on" in Mail.objects.get(kind="deadline").subject
 
 
 def test_a_maintainer_previews_an_announcement_and_sends_it_once(

@@ -338,7 +338,7 @@ def test_a_maintainer_resets_the_second_factor_of_another_with_a_reason(owner: U
     assert not Authenticator.objects.filter(user=owner).exists()
     event = AuditEvent.objects.get(verb="second factor reset")
     assert (event.noun, event.noun_id, event.details) == ("User", str(owner.pk), {"reason": "lost the phone"})
-    assert Mail.objects.get(user=owner).subject == "Two-factor authentication is off"
+    assert Mail.objects.get(user=owner).subject == "[TSTTC leaderboard] Two-factor authentication is off"
     assert sign_in(Client(), owner) == "/submissions/"
 
 

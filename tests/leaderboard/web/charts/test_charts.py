@@ -146,7 +146,7 @@ def test_the_front_is_what_nothing_beats_in_both(client: Client, entries: list[S
 def test_a_board_with_nothing_to_draw_says_so_and_has_no_empty_chart(client: Client, benchmark: None) -> None:
     root = get(client, "/board/demo/charts/")
     assert root.all("figure") == []
-    assert "There are no results on demo yet." in root.one("main").text
+    assert "There are no results on Demo yet." in root.one("main").text
     assert client.get("/board/nowhere/charts/").status_code == 404
 
 
@@ -266,11 +266,16 @@ def test_team_looks_closer_at_what_it_sent_to_an_open_split(
     assert client.get(address).status_code == 404
 
 
-def test_errors_by_time_stand_beside_those_of_the_best_public_row(
+def test_errors_by_time_stand_beside_those_of_the_best_public_row_and_of_the_baseline(
     client: Client, open_split: Submission, stranger: User
 ) -> None:
     edition = open_split.evaluations.get().edition
-    for factor, name, shown in ((1.01, "Secret", "PRIVATE"), (1.02, "Best", "PUBLIC")):
+    for factor, name, shown in (
+        (1.01, "Secret", "PRIVATE"),
+        (1.02, "Best", "PUBLIC"),
+        (1.3, "Pixel MSE, ours", "PUBLIC"),
+        (1.4, "Pixel MSE, worse", "PUBLIC"),
+    ):
         builders.submit(
             stranger, builders.predictions(edition, factor=factor), split="val", method=name, visibility=shown
         )
@@ -279,11 +284,15 @@ def test_errors_by_time_stand_beside_those_of_the_best_public_row(
     client.force_login(open_split.submitted_by)
     figure = get(client, f"/submissions/{open_split.pk}/analysis/").one("figure", **{"data-chart": "curve"})
     heads = [head.text for head in figure.one("thead").all("th")]
-    assert heads[-2:] == ["MiD of Best", "RTE of Best"]
+    names = ("Best", "Pixel MSE, ours")
+    assert heads[-4:] == [f"{metric} of {name}" for name in names for metric in ("MiD", "RTE")]
     best = Submission.objects.get(method__name="Best").evaluations.get().analysis.content["curve"]
-    cells = [row.all("td")[-2].text for row in figure.one("tbody").all("tr")]
+    cells = [row.all("td")[-4].text for row in figure.one("tbody").all("tr")]
     assert cells == [f"{row['mid']:.2f}" for row in best]
-    grey = [each for each in options_of(figure)["series"] if each["name"] == "Best row: Best"]
+    series = options_of(figure)["series"]
+    grey = [each for each in series if each["name"] == "Best row: Best"]
+    dashed = {each["name"] for each in series if each.get("lineStyle", {}).get("type") == "dashed"}
+    assert dashed == {"Baseline (dashed): Pixel MSE, ours"}
     assert [y for each in grey if each["yAxisIndex"] == 0 for _, y in each["data"]] == [
         row["mid"] for row in best
     ]

@@ -126,7 +126,7 @@ def test_without_methods_it_offers_those_of_the_board(client: Client, entries: l
     # As many decimals as the edition publishes: the test split's have one.
     choices = [choice.text for choice in root.all("label", class_="choice")]
     assert all(re.search(r"MiD\s\d+\.\d$", text.strip()) for text in choices), choices
-    assert "No method has a score on demo yet." in words(get(client, split="demo"))
+    assert "No method has a score on Demo yet." in words(get(client, split="demo"))
 
 
 def test_too_few_recordings_are_named_and_no_p_is_shown(
@@ -206,7 +206,7 @@ def test_what_was_chosen_of_several_submissions_is_shown_and_what_that_is_worth(
 def test_choice_opens_on_the_first_split_whose_submissions_are_scored(
     client: Client, benchmark: None, tmp_path: Path
 ) -> None:
-    assert "No method has a score on test yet." in words(pages.page(client.get("/compare/")))
+    assert "No method has a score on Test yet." in words(pages.page(client.get("/compare/")))
     builders.import_truth(tmp_path, split="val")
     builders.board_changed("val")
-    assert "No method has a score on val yet." in words(pages.page(client.get("/compare/")))
+    assert "No method has a score on Validation yet." in words(pages.page(client.get("/compare/")))

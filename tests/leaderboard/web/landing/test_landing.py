@@ -100,7 +100,7 @@ def test_without_a_split_an_entry_or_with_one_entry_it_says_so(
 ) -> None:
     PublishedResult.objects.all().delete()
     builders.board_changed("test")
-    assert "There are no ranked results on test yet." in panel(client, "leaders").text
+    assert "There are no ranked results on Test yet." in panel(client, "leaders").text
     builders.submit(owner, builders.predictions(edition), method="Alone")
     builders.score_all()
     (row,) = panel(client, "leaders").all("li")

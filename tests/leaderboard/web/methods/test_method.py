@@ -1,5 +1,6 @@
 """A method's page."""
 
+import html
 import re
 from pathlib import Path
 
@@ -114,6 +115,9 @@ def test_head_says_the_score_its_lead_and_the_way_there(client: Client, method: 
     assert f"Ahead of the next−{best - own:.1f}Deep Scale, {best}" in card.text
     assert "2 submissions over time" in card.text
     assert len(card.all("svg", class_="sparkline")) == 1
+    Method.objects.update(visibility=Visibility.ANONYMOUS)
+    builders.board_changed("test")
+    assert "over time" not in get(client, method).one("main").text, "nobody knows the order within a day"
     strip = main.one("figure", class_="all-values")
     assert strip.one("span", class_="spoken").text == "MiD of all methods: 0 lower, 5 not."
     assert len(strip.one("svg", class_="strip").all("line", class_="own")) == 1
@@ -146,3 +150,17 @@ def test_nearby_differences_have_their_intervals_once_a_worker_has_computed_them
     gaps.append(pages.get(client, address).one("table", class_="gaps").text)
     assert ["computing…" in text for text in gaps] == [True, False]
     assert re.search(r"Bar[0-9.]+−[0-9.]+−[0-9.]+ to −[0-9.]+", gaps[1])
+
+
+def test_own_method_offers_the_next_submission_and_lists_the_rejected_ones(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
+    sent = builders.submit(owner, b"[]", method="Night & day", visibility="PRIVATE")
+    builders.score_all()
+    main = pages.get(signed_in, f"/methods/{sent.method_id}/").one("main")
+    (button,) = [a for a in main.all("a") if a.text == "Submit again"]
+    assert [row.all("td")[3].text for row in main.one("tbody").all("tr")] == [
+        "rejectedThe outermost value is a list"
+    ]
+    form = pages.get(signed_in, html.unescape(button.attributes["href"])).one("form", id="submit")
+    assert form.one("input", name="method").attributes["value"] == "Night & day"

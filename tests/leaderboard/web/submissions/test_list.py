@@ -1,5 +1,7 @@
 """The list of one's own submissions: what is in it, search, filters, pages, and links both ways."""
 
+import html
+
 import pytest
 from django.test import Client
 from pytest_django import DjangoAssertNumQueries
@@ -30,7 +32,7 @@ def test_list_has_my_teams_submissions_with_state_and_errors(
     assert [row[3] for row in rows] == [
         "queued",
         "rejectedThe outermost value is a list",
-        "scored",
+        "scored Compare Scored one",
     ]
     mid = scored.evaluations.get().scores.get(metric="mid", ttc_range="overall").value
     assert [row[4] for row in rows] == ["–", "–", f"{mid:.1f}"]
@@ -48,6 +50,7 @@ def test_number_of_queries_does_not_grow_with_the_list(
     for i in range(5):
         builders.submit(owner, builders.predictions(edition, factor=1.1 + i / 10))
     builders.score_all()
+    signed_in.get("/submissions/")  # The first reader after a change reads the board.
     with django_assert_max_num_queries(10):
         signed_in.get("/submissions/")
 
@@ -103,3 +106,39 @@ def test_long_lists_come_in_pages(
     assert root.one("nav", class_="pages").one("a").attributes["href"] == "?page=2"
     assert len(pages.page(signed_in.get("/submissions/?page=2")).one("tbody").all("tr")) == 1
     assert signed_in.get("/submissions/?page=nonsense").status_code == 200
+
+
+def test_best_of_the_team_stands_on_top_and_rows_of_the_board_can_be_compared(
+    signed_in: Client, edition: Edition, owner: User, stranger: User
+) -> None:
+    theirs = builders.submit(stranger, builders.predictions(edition, factor=1.01), method="Foreign one")
+    best = builders.submit(
+        owner, builders.predictions(edition, factor=1.05), method="Mine", visibility="PRIVATE"
+    )
+    worse = builders.submit(
+        owner, builders.predictions(edition, factor=1.2), method="Mine", visibility="PRIVATE"
+    )
+    builders.score_all()
+    main = pages.page(signed_in.get("/submissions/")).one("main")
+    line = main.one("dl", class_="facts-list")
+    (value,) = best.evaluations.get().scores.filter(metric="mid", ttc_range="overall").values_list("value")
+    assert line.text.startswith(f"Best on TestMiD {value[0]:.1f}: Mine, would be rank 2 of 7, +")
+    compare = f"/compare/?split=test&m={best.method_id}&m={theirs.method_id}"
+    assert [html.unescape(a.attributes["href"]) for a in line.all("a")] == [
+        "/board/test/",
+        f"/submissions/{best.pk}/",
+        compare,
+    ]
+    assert signed_in.get(compare).status_code == 200
+    links = {
+        row.all("a")[0].attributes["href"]: [
+            a.attributes["href"] for a in row.all("a") if "Compare" in a.text
+        ]
+        for row in main.one("tbody").all("tr")
+    }
+    assert links[f"/submissions/{worse.pk}/"] == [], "the board shows another submission of the method"
+    (choice,) = links[f"/submissions/{best.pk}/"]
+    chosen = pages.get(signed_in, html.unescape(choice)).one("form", id="compare-form")
+    assert [box.attributes["value"] for box in chosen.all("input") if "checked" in box.attributes] == [
+        str(best.method_id)
+    ]
