@@ -238,7 +238,9 @@ def test_pairs_that_are_withheld_show_their_published_difference_alone(
     assert len(hidden) == len(compared)
     assert {(row[3], row[4]) for row in hidden} == {("", "no test")}
     series = {each["name"]: each for each in options_of(pairs_figure(client))["series"]}
-    assert len(series["no test (anonymous)"]["data"]) == len(compared)
+    untested = series["no test (anonymous)"]
+    assert len(untested["data"]) == len(compared)
+    assert untested["itemStyle"]["borderColor"] == "--quiet", "its fill is too pale to be seen"
 
 
 # --- the closer look -------------------------------------------------------------------------------------
