@@ -1,10 +1,11 @@
-"""What holds of every page that the site has: light and dark, wide and narrow, with scripts and without."""
+"""What holds of every page, light and dark, wide and narrow, with scripts or not; where methods differ."""
 
 import json
+import re
 from uuid import UUID
 
 import pytest
-from playwright.sync_api import Browser, Page, Route
+from playwright.sync_api import Browser, Page, Route, expect
 
 import evaluator
 from tests.browser import world
@@ -32,17 +33,20 @@ OTHERS = {
     "handle": str(UUID(int=0)),
     "invitation_id": str(UUID(int=0)),
 }
+PAIR = "/compare/?split=val&m={method_id}&m={second_method_id}"
 VIEWS = (
     "/board/val/?columns=mid&nerf=no",
     "/board/val/?columns=rte&q=nothing+like+it",
     "/compare/?split=val",
-    "/compare/?split=val&m={method_id}&m={second_method_id}",
+    PAIR,
     "/compare/?split=val&{five}",
     "/docs/search/?q=quota",
 )
 # Answered with a code that says what is wrong, of which a browser rightly complains.
 WRONG = {"invitation-over", "board-wrong-filter"}
 FAULTS = ("/nowhere/", f"/board/{world.SPLIT}/?sort=nothing", f"/board/{world.SPLIT}/?at=never")
+# A difference with its sign and interval, and p with its class.
+CARD = re.compile(r"MiD [−+]\d+\.\d\d \([−+].+ to [−+].+\)\s*p .+: (p < 0\.\d+|not significant)$")
 # What does nothing unless a script hears it.
 DEAD = """() => [...document.querySelectorAll("button[type=button], .tray, .messages .close")]
   .filter(each => each.checkVisibility()).map(each => each.outerHTML.slice(0, 120))"""
@@ -153,3 +157,53 @@ def test_without_scripts_every_public_page_fits_and_nothing_on_it_is_dead(
             page.set_viewport_size(viewport)  # type: ignore[arg-type]  # a plain dict of the right shape
             faults_at[address, viewport["width"]] = (max(0, page.evaluate(OVERFLOW_PX)), page.evaluate(DEAD))
     assert {where: faults for where, faults in faults_at.items() if faults != (0, [])} == {}
+
+
+def test_without_scripts_the_landing_page_has_no_heading_over_a_chart_that_is_not_there(
+    new_page: NewPage, known: dict[str, str]
+) -> None:
+    page = new_page(java_script_enabled=False)
+    page.goto("/")
+    expect(page.locator("h2", has_text="Progress over time")).to_have_count(1)
+    expect(page.locator("h2", has_text="Progress over time")).to_be_hidden()
+
+
+# --- where methods differ ----------------------------------------------------------------------------------
+
+
+def test_contact_lens_moves_by_keyboard_and_its_numbers_with_it(page: Page, known: dict[str, str]) -> None:
+    page.goto(PAIR.format(**known))
+    slider, time, numbers = (page.locator(f"#lens{part}") for part in ("-slider", "-time", " dd span"))
+    vehicle = page.locator("#lens-vehicle")
+    expect(time).to_have_text("20.0 s")
+    far, errors = vehicle.get_attribute("transform") or "", numbers.all_inner_texts()
+    for _ in range(3):  # beyond the middle of the last range errors stay
+        slider.press("PageDown")
+    expect(time).not_to_have_text("20.0 s")
+    expect(slider).to_have_attribute("aria-valuetext", time.inner_text().replace(" s", " seconds"))
+    expect(vehicle).not_to_have_attribute("transform", far)
+    assert not set(errors) & set(numbers.all_inner_texts())
+    slider.press("Home")
+    expect(numbers).to_have_text(["0.00 s, 0.0 m"] * 2)
+
+
+def test_without_a_script_the_table_replaces_the_contact_lens(
+    new_page: NewPage, known: dict[str, str]
+) -> None:
+    page = new_page(java_script_enabled=False)
+    page.goto(PAIR.format(**known))
+    expect(page.locator("#lens-slider")).to_be_hidden()
+    expect(page.locator("#lens-table tbody tr").first).to_be_visible()
+
+
+def test_cell_of_the_significance_chart_says_sign_size_and_significance(
+    page: Page, known: dict[str, str]
+) -> None:
+    page.goto(f"/board/{world.SPLIT}/charts/")
+    figure = page.locator("figure[data-chart=significance]")
+    figure.locator(".plot").scroll_into_view_if_needed()
+    difference = figure.locator("tbody tr").first.locator("td").nth(2).text_content() or ""
+    expect(figure.locator(".drawing svg text", has_text=difference).first).to_be_visible()
+    figure.locator(".drawing").press("Home")
+    expect(figure.locator(".card")).to_contain_text(CARD)
+    expect(figure.locator(".card")).to_contain_text(difference)

@@ -75,6 +75,24 @@ class Cell:
         return "; ".join(filter(None, hints))
 
     @property
+    def drawn(self) -> SafeString:
+        """Return the table cell; a large board has a thousand, for which a template takes far longer.
+
+        Its parts are numbers and words of this module: there is nothing to escape.
+        """
+        text, spoken = self.text, ""
+        if self.is_best or self.is_second:
+            tag, mark = ("strong", "best") if self.is_best else ("u", "second")
+            text = f'<{tag}>{text}</{tag}><span class="spoken"> {mark}</span>'
+        if self.is_with_best:
+            spoken += f'<span class="spoken">, {MARKED}</span>'
+        if self.interval and not self.whisker:
+            spoken += f'<span class="spoken">, {self.interval}</span>'
+        css = f"{self.css} {self.range_css}" + " with-best" * self.is_with_best
+        title = f' title="{hint}"' if (hint := self.hint) else ""
+        return SafeString(f'<td class="{css}"{title}>{text}{spoken}</td>')
+
+    @property
     def ends(self) -> list[str]:
         """Return both ends of the interval, for a narrow column."""
         return self.interval.split(" to ")

@@ -18,6 +18,7 @@ from leaderboard.statistics import comparisons
 from leaderboard.statistics.comparisons import Pair
 from leaderboard.web.charts import board_charts, profile_chart, significance_chart
 from leaderboard.web.charts.chart_options import Chart
+from leaderboard.web.charts.range_leaders import range_leaders
 from leaderboard.web.lookups import split_or_404
 
 N_PROFILES = 5
@@ -39,6 +40,7 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
         "latency": board_charts.latency(_public(board), metric=board.rules.primary),
         "profile": profile(board),
         "n_profiles": N_PROFILES,
+        "range_leaders": range_leaders(board),
         "significance": significance_chart.significance(pairs, split=board.split.pk),
         "is_computing": any(pair.differences is None for pair in pairs),
         "n_first": comparisons.N_FIRST,

@@ -25,7 +25,7 @@ ANONYMOUS, UNTESTED = "no test (anonymous)", "no test"
 _INKS: Final = dict(
     zip(
         (*SIGNIFICANT.values(), UNDECIDED, ANONYMOUS, UNTESTED, COMPUTING),
-        ("--heat1", "--heat2", "--heat3", "--hair", "--tint", "--tint", "--doubt-tint"),
+        ("--heat1", "--heat2", "--heat3", "--hair", "--tint", "--ground", "--doubt-tint"),
         strict=True,
     )
 )
@@ -116,6 +116,9 @@ def _series(name: str, pair_cells: Sequence[_Cell]) -> Option:
     series = cells(name, [cell.mark() for cell in pair_cells], _INKS[name])
     for item, cell in zip(series["data"], pair_cells, strict=True):
         item["text"] = "" if cell.difference is None else cell.texts()[0]
+    if name in (ANONYMOUS, UNTESTED):
+        # Nearly the ground: the outline tells it apart, above the rims of the cells beside it.
+        series |= {"itemStyle": {"color": _INKS[name], "borderColor": "--quiet", "borderWidth": 1}, "z": 3}
     ink = "--ground" if name == SIGNIFICANT[0.001] else "--ink"
     return series | {"label": {"show": True, "color": ink, "fontSize": 11, "formatter": call("text")}}
 

@@ -20,7 +20,8 @@ from leaderboard.models import Split, User
 from leaderboard.quotas import admissions
 from leaderboard.web.boards import board_query
 from leaderboard.web.charts import chart_views, profile_chart
-from leaderboard.web.landing.leaders import N_LEADERS, lead_words, leaders, range_leaders
+from leaderboard.web.charts.range_leaders import range_leaders
+from leaderboard.web.landing.leaders import N_LEADERS, lead_words, leaders
 from leaderboard.web.landing.news import latest
 from leaderboard.web.submissions.forms import offers_for
 

@@ -150,6 +150,15 @@ def test_a_board_with_nothing_to_draw_says_so_and_has_no_empty_chart(client: Cli
     assert client.get("/board/nowhere/charts/").status_code == 404
 
 
+def test_leaders_by_range_stand_below_their_chart_as_a_table(
+    client: Client, entries: list[Submission]
+) -> None:
+    root = get(client, "/board/test/charts/")
+    leads = root.one("section", **{"aria-labelledby": "profile"}).one("table", class_="attempts-list")
+    assert [row.one("th").text for row in leads.all("tr")] == ["0–3 s", "3–6 s", "6–20 s", "−20–0 s"]
+    assert leads.text == get(client, "/").one("table", class_="attempts-list").text
+
+
 def test_private_methods_are_in_no_chart_not_even_their_teams(
     client: Client, entries: list[Submission], owner: User, edition: object
 ) -> None:
@@ -229,7 +238,9 @@ def test_pairs_that_are_withheld_show_their_published_difference_alone(
     assert len(hidden) == len(compared)
     assert {(row[3], row[4]) for row in hidden} == {("", "no test")}
     series = {each["name"]: each for each in options_of(pairs_figure(client))["series"]}
-    assert len(series["no test (anonymous)"]["data"]) == len(compared)
+    untested = series["no test (anonymous)"]
+    assert len(untested["data"]) == len(compared)
+    assert untested["itemStyle"]["borderColor"] == "--quiet", "its fill is too pale to be seen"
 
 
 # --- the closer look -------------------------------------------------------------------------------------

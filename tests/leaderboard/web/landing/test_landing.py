@@ -3,6 +3,7 @@
 import json
 from datetime import timedelta
 
+from django.conf import settings
 from django.test import Client
 from django.utils import timezone
 
@@ -83,6 +84,15 @@ def test_its_one_filled_button_leads_to_a_split_that_is_open(client: Client, edi
     Split.objects.filter(pk="demo").update(current_edition=None)
     builders.board_changed("demo")
     assert filled_buttons(client) == []
+
+
+def test_what_one_downloads_to_submit_is_one_click_away(client: Client, edition: Edition) -> None:
+    links = {
+        each.text: each.attributes["href"] for each in landing(client).one("div", class_="hero").all("a")
+    }
+    assert links["Get the data"] == settings.BENCHMARK.dataset.url
+    assert links["template (JSON) of Test"] == "/submit/template/test.json"
+    assert links["manifest (sequence list, CSV) of Test"] == "/api/v1/splits/test/manifest"
 
 
 def test_a_private_method_leads_nowhere_on_it_not_even_for_its_own_team(
