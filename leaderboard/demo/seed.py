@@ -20,6 +20,7 @@ from leaderboard.editions import ground_truth
 from leaderboard.errors.refusals import Refused
 from leaderboard.methods import editing, visibility
 from leaderboard.models import Split, Submission, User, Visibility
+from leaderboard.people import teams
 from leaderboard.submissions import intake
 
 SPLIT = "demo"
@@ -32,6 +33,7 @@ TEAMS = {
     "Baselines on pixels": "pixels@example.org",
 }
 """Each team with the address of its one account."""
+_PERSON = "Robin Larsen"
 _PAPER = "https://arxiv.org/abs/2309.01539"
 _RENDERED = (
     "The frames are rendered, not filmed. Rendered vehicles are flat: they do not turn, shine or bend, "
@@ -176,7 +178,7 @@ def seed(*, now: datetime, password_path: Path) -> str:
         password_path.touch(mode=0o600)
         password_path.write_text(secrets.token_urlsafe(9))
     password = password_path.read_text().strip()
-    users = {entry.email: _user(entry) for entry in ENTRIES}
+    users = {entry.email: _user(entry, now=now) for entry in ENTRIES}
     _create_account(users[DEMO_EMAIL], password=password)
     maintainer, _ = User.objects.get_or_create(
         email=MAINTAINER_EMAIL, defaults={"name": "Maintainer", "is_staff": True}
@@ -192,10 +194,12 @@ def seed(*, now: datetime, password_path: Path) -> str:
     return password
 
 
-def _user(entry: DemoEntry) -> User:
-    return User.objects.filter(email=entry.email).first() or User.objects.create_user(
-        entry.email, name=entry.team
-    )
+def _user(entry: DemoEntry, *, now: datetime) -> User:
+    user = User.objects.filter(email=entry.email).first()
+    if user is None:
+        user = User.objects.create_user(entry.email, name=_PERSON)
+        teams.create(user=user, name=entry.team, now=now)
+    return user
 
 
 def _create_account(user: User, *, password: str) -> None:

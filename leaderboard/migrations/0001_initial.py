@@ -227,7 +227,7 @@ class Migration(migrations.Migration):
             name='Mail',
             fields=[
                 ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('kind', models.CharField(choices=[('account', 'Your account'), ('scored', 'A file that I sent on the site is scored or rejected'), ('edition', 'A new edition of a board that has an entry of my team'), ('token', 'An API token of mine ends within a week'), ('deadline', 'A split that my team has submitted to closes within three days'), ('announcement', 'Announcements to the teams of a split')], max_length=16)),
+                ('kind', models.CharField(choices=[('account', 'Your account'), ('scored', 'My files submitted on the site: scored, rejected or failed'), ('edition', 'New editions of boards with entries of my team'), ('token', 'My API tokens expiring within a week'), ('deadline', 'Splits my team submitted to that close within three days'), ('announcement', 'Announcements about splits my team submitted to')], max_length=16)),
                 ('recipient', models.EmailField(blank=True, max_length=254)),
                 ('subject', models.CharField(blank=True, max_length=250)),
                 ('text', models.TextField(blank=True)),

@@ -11,11 +11,11 @@ class MailKind(models.TextChoices):
     """What a mail is about. A person can switch off every kind but the first."""
 
     ACCOUNT = "account", "Your account"
-    SCORED = "scored", "A file that I sent on the site is scored or rejected"
-    EDITION = "edition", "A new edition of a board that has an entry of my team"
-    TOKEN = "token", "An API token of mine ends within a week"
-    DEADLINE = "deadline", "A split that my team has submitted to closes within three days"
-    ANNOUNCEMENT = "announcement", "Announcements to the teams of a split"
+    SCORED = "scored", "My files submitted on the site: scored, rejected or failed"
+    EDITION = "edition", "New editions of boards with entries of my team"
+    TOKEN = "token", "My API tokens expiring within a week"
+    DEADLINE = "deadline", "Splits my team submitted to that close within three days"
+    ANNOUNCEMENT = "announcement", "Announcements about splits my team submitted to"
 
 
 class Mail(models.Model):

@@ -18,6 +18,7 @@ _SECTIONS = {
     "/compare/": "board",
     "/submit/": "submit",
     "/submissions/": "submissions",
+    "/accounts/logout/": "",
     "/account": "account",
     "/team/": "account",
     "/tokens/": "account",

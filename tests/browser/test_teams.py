@@ -31,5 +31,5 @@ def test_link_lets_a_second_person_in(new_page: NewPage) -> None:
     # A browser names the origin of the form only where the page does not forbid it to.
     guest.get_by_role("button", name="Join Two of them").click()
     guest.wait_for_url("**/team/")
-    expect(guest.get_by_role("heading", level=1)).to_have_text("Team Two of them")
+    expect(guest.get_by_role("heading", level=1)).to_have_text("Two of them")
     expect(guest.get_by_role("cell", name="first-of-two@example.org")).to_be_visible()

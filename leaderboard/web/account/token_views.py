@@ -31,8 +31,8 @@ class TokenForm(SiteForm):
         label="Scope",
         widget=forms.CheckboxSelectMultiple,
         choices=[
-            (Scope.SUBMIT, "submit: submit and withdraw files, edit methods and publish them for good"),
-            (Scope.READ, "read: read results"),
+            (Scope.SUBMIT, "Submit and withdraw files, edit and publish methods"),
+            (Scope.READ, "Read results"),
         ],
         initial=list(Scope.values),
         error_messages={"required": "The token has no scope; expected read, submit, or both."},

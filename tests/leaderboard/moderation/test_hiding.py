@@ -255,7 +255,7 @@ def test_the_account_page_exports_and_deletes(signed_in: Client, edition: Editio
     # Whoever finds an open session reads the address on the page, but does not know the password.
     asked = signed_in.post("/account/data/", {"email": "Owner@example.org"})
     assert asked.headers["Location"] == "/accounts/reauthenticate/?next=%2Faccount%2Fdata%2F"
-    assert "deletes the account" in assert_sound(signed_in.get(asked.headers["Location"])).text
+    assert "deleting your account" in assert_sound(signed_in.get(asked.headers["Location"])).text
     signed_in.post("/accounts/reauthenticate/", {"password": "wrong", "next": "/account/data/"})
     assert User.objects.filter(email="owner@example.org").exists()
     # The password sends the form that was filled in.

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from allauth.account.models import EmailAddress
 from django.core import mail
 from django.http import HttpResponseBase
 from django.test import Client
@@ -42,10 +43,25 @@ def test_account_begins_with_what_it_has_and_leads_to_each_part(signed_in: Clien
     tiles = {
         li.one("a").text: (li.one("strong").text, li.one("a").attributes["href"]) for li in root.all("li")
     }
-    assert tiles["Email addresses"][0] == owner.email
+    assert tiles["Email"][0] == owner.email
     assert tiles["API tokens"] == ("1", "/tokens/")
-    assert tiles["Two-factor authentication"][0] == "off"
+    assert tiles["Two-factor"][0] == "off"
     assert all(signed_in.get(address).status_code == 200 for _, address in tiles.values())
+
+
+def test_page_of_addresses_offers_only_what_applies(signed_in: Client, owner: User) -> None:
+    def offered() -> list[str]:
+        names = [
+            button.attributes.get("name") for button in pages.get(signed_in, "/accounts/email/").all("button")
+        ]
+        return [name.removeprefix("action_") for name in names if name]
+
+    first = EmailAddress.objects.create(user=owner, email=owner.email, verified=False, primary=True)
+    assert offered() == ["send", "add"]
+    EmailAddress.objects.filter(pk=first.pk).update(verified=True)
+    assert offered() == ["add"]
+    EmailAddress.objects.create(user=owner, email="second@example.org", verified=True)
+    assert offered() == ["primary", "remove", "add"]
 
 
 def test_forgotten_password_is_reset_by_a_link(client: Client, owner: User, benchmark: None) -> None:
