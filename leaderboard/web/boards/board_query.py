@@ -151,7 +151,7 @@ def tools(
         ],
         # Whether any filter is set, besides the text to find: else they need no room.
         "has_choices": any(text for name, text in given.items() if name != _SEARCH),
-        "sentence": sentence(len(board.entries), board.n_in_all, is_filtered=query.filters.is_set),
+        "sentence": sentence(board, is_filtered=query.filters.is_set),
         "clear_href": query.href(**dict.fromkeys(FILTERS, "")),
         "address": query.href(page=str(query.page) if query.page > 1 else ""),
         # Of an edition's board there is no other time.
@@ -167,14 +167,10 @@ def _words(name: str, text: str) -> str:
     return next((option.words for option in options if option.text.lower() == text.lower()), text)
 
 
-def sentence(n_shown: int, n_in_all: int, *, is_filtered: bool) -> str:
-    """Count the rows shown and in all.
-
-    >>> sentence(4, 12, is_filtered=True), sentence(0, 1200, is_filtered=True)
-    ('4 of 12 results', 'No results among 1,200 rows')
-    """
-    if not is_filtered:
-        return counted(n_in_all, "result")
-    if not n_shown:
-        return f"No results among {counted(n_in_all, 'row')}"
-    return f"{grouped(n_shown)} of {counted(n_in_all, 'result')}"
+def sentence(board: Board, *, is_filtered: bool) -> str:
+    """Count the rows shown and in all, private ones apart: they have no place among the ranks."""
+    if is_filtered:
+        return f"{grouped(len(board.entries))} of {counted(board.n_in_all, 'result')}"
+    n_private = sum(not entry.is_visible_to_all for entry in board.entries)
+    results = counted(board.n_in_all - n_private, "result")
+    return f"{results}, {grouped(n_private)} private" if n_private else results

@@ -57,14 +57,13 @@ def _change_words(change: history.TruthChange | None, old: Edition, new: Edition
 
 
 def news(split: Split) -> str:
-    """Word the last change of a board; empty for its first edition."""
+    """Word the last change to the current edition of a board; empty for its first."""
     publication = history.latest_change(split)
     if publication is None or publication.replaced is None:
         return ""
     if publication.kind == Publication.Kind.ROLLED_BACK:
-        return f"rolled back to edition {publication.edition.number}"
-    words = change_words(publication.replaced, publication.edition)
-    return f"edition {publication.edition.number}, {words}"
+        return "rolled back"
+    return change_words(publication.replaced, publication.edition)
 
 
 def past_change(past: history.EditionRecord) -> str:

@@ -28,6 +28,12 @@ class Ladder(NamedTuple):
     n_ranks: int  # of the scale
     n_certain: int  # methods whose rank is the only one at 95%
     n_ranked: int
+    axis: SafeString
+
+    @property
+    def is_certain(self) -> bool:
+        """Tell whether no method could have another rank."""
+        return self.n_certain == self.n_ranked
 
     @property
     def n_left_out(self) -> int:
@@ -62,4 +68,5 @@ def rank_ladder(entries: Iterable[Entry], *, primary: str) -> Ladder | None:
         n_ranks=n_ranks,
         n_certain=sum(low == high for _, low, high, _ in ranked),
         n_ranked=len(ranked),
+        axis=whiskers.axis(scale, {rank - 0.5: rank for rank in (1, n_ranks)}),
     )

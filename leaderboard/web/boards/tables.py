@@ -147,7 +147,9 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
             source_number=numbers.get(entry.source),
             note=_note(entry, board.split.current_edition),
             attempts=_attempts(entry),
-            chips=details.chips(entry.details, of_row=True),
+            chips=tuple(
+                chip for chip in details.chips(entry.details, of_row=True) if chip[1] not in entry.method
+            ),
             is_new=entry.method_id in new,
             moved=moved.get(entry.method_id, 0) if entry.method_id else 0,
         )
@@ -220,7 +222,8 @@ def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, Whisker
         public = [(value, ends_of(entry, name)) for value, entry in values if entry.is_visible_to_all]
         best = min(public, default=None, key=lambda each: each[0])
         band = (best[1] or (best[0], best[0])) if best else None
-        scale = whiskers.scale_of([value for value, _ in values], known, best=band)
+        # Private rows on no public scale: what a reader sees does not depend on what else he may see.
+        scale = whiskers.scale_of([value for value, _ in public], known, best=band)
         if scale is not None:
             scales[name] = scale
     return scales

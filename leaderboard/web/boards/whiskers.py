@@ -5,7 +5,7 @@ Drawings are sized in percent, so the same bytes fit every screen; the cell has 
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,8 +17,8 @@ _MOST: Final = 0.8
 _ROOM: Final = 1.25
 # A scale that spans more than this factor is logarithmic, so that the leading rows do not share one pixel.
 _LOG_FROM: Final = 2.5
-_MARGIN: Final = 4.0
-_BEYOND: Final = 86.0
+# Room for the marks and labels at both ends, which would else touch the next column.
+_MARGIN: Final = 10.0
 # Two labels of an axis stand at least so far apart.
 _LABEL_GAP: Final = 24.0
 _STEPS: Final = (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
@@ -101,13 +101,13 @@ def scale_of(values: Iterable[float], intervals: Iterable[Ends], *, best: Ends |
 
 
 def whisker(scale: WhiskerScale, value: float, ends: Ends | None) -> SafeString:
-    """Draw a tick on its interval, a ring without one, dashes off the scale."""
+    """Draw a tick on its interval, a ring without one, an arrow off the scale."""
     parts = [_band(scale)]
     if ends is not None and ends[0] <= scale.high:
         left, right = map(scale.percent, ends)
         parts.append(_line("span", left, right))
     if value > scale.high:
-        parts.append(_line("beyond", _BEYOND, 100.0))
+        parts.append(format_html('<text class="beyond" x="97%" y="50%">{}</text>', "→"))
     else:
         at = f"{scale.percent(value):g}"
         # Narrower than a dot would be, so that a short interval is seen on both sides of it.
@@ -116,9 +116,10 @@ def whisker(scale: WhiskerScale, value: float, ends: Ends | None) -> SafeString:
     return _svg("whisker", parts)
 
 
-def axis(scale: WhiskerScale) -> SafeString:
-    """Draw the scale for the head of a column."""
-    ticks = [(f"{scale.percent(value):g}", f"{value:g}") for value in scale.labels()]
+def axis(scale: WhiskerScale, labels: Mapping[float, float] | None = None) -> SafeString:
+    """Draw the scale for the head of a column; `labels` by value, else round numbers."""
+    named = labels or {value: value for value in scale.labels()}
+    ticks = [(f"{scale.percent(value):g}", f"{label:g}") for value, label in named.items()]
     marks = format_html_join("", '<line x1="{0}%" x2="{0}%" y1="13" y2="17"/>', ((at,) for at, _ in ticks))
     texts = format_html_join("", '<text x="{}%" y="10" text-anchor="middle">{}</text>', ticks)
     return _svg("axis", [marks, texts])

@@ -160,7 +160,7 @@ def test_pages_answers_and_exports_say_which_unit_it_is(client: Client, tmp_path
         return pages.page(response).one("main").text
 
     assert "95% confidence intervals (bootstrap over 32 days)" in words("/board/test/")
-    assert "32 days: what confidence intervals" in words("/board/test/editions/1/")
+    assert "32 days: treated as independent in confidence intervals" in words("/board/test/editions/1/")
     method = words(f"/methods/{sent[0].method_id}/").replace("\xa0", " ")
     assert "Intervals and rank ranges: 95% confidence, over 32 days." in method
     pair = [str(each.method_id) for each in sent[:2]]

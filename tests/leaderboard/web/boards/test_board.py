@@ -49,7 +49,7 @@ def test_published_numbers_stand_as_printed(client: Client, benchmark: None) -> 
     assert first[MID:] == ["14.8", "27.6", "15.6", "11.5", "13.7", "12.3", "6.5", "8.8", "13.1", "15.0"]
 
 
-def test_published_rows_are_marked_and_lead_to_their_citation(client: Client, benchmark: None) -> None:
+def test_published_rows_are_marked_and_lead_to_their_citation(client: Client, edition: Edition) -> None:
     root = get(client)
     for row in root.one("table", class_="board").one("tbody").all("tr"):
         tag = row.one("a", class_="tag")
@@ -57,6 +57,13 @@ def test_published_rows_are_marked_and_lead_to_their_citation(client: Client, be
         source = root.one("li", id=tag.attributes["href"].removeprefix("#"))
         assert "Yuheng Shi" in source.text
         assert source.one("a").attributes["href"] == "https://arxiv.org/abs/2309.01539"
+
+
+def test_board_of_published_rows_alone_says_so_once(client: Client, benchmark: None) -> None:
+    root = get(client)
+    assert root.one("table", class_="board").all("a", class_="tag") == []
+    assert "results quoted from papers" in root.one("p", class_="facts").text
+    assert "Yuheng Shi" in root.one("li", id="source-1").text
 
 
 def test_heads_are_plain_links_that_turn_round(client: Client, benchmark: None) -> None:
@@ -87,7 +94,7 @@ def test_closed_board_lists_what_is_open_once(client: Client, edition: Edition, 
     builders.import_truth(tmp_path, split="demo", seed=1)
     facts = get(client, "/board/val/").one("p", class_="facts")
     assert facts.one("span", class_="badge").text == "Not open for submissions yet"
-    assert "open for submissions: Test, Demo" in facts.text
+    assert "Test and Demo are open" in facts.text
     Split.objects.filter(pk="test").update(closes_at=datetime(2026, 1, 31, tzinfo=UTC))
     assert get(client).one("span", class_="badge").text == "Closed for submissions since 2026-01-31"
     assert get(client).all("p", class_="notice") == []
@@ -108,7 +115,7 @@ def test_anonymous_row_changes_the_time_of_the_board_by_its_day(
 
 def test_chart_below_the_board_holds_for_any_filter(client: Client, benchmark: None) -> None:
     section = get(client, "/board/test/?q=nerf").one("section", class_="board-progress")
-    assert "The first 5 rows of the board" in section.text
+    assert "All rows of the board" in section.text
     assert "Pixel MSE" in section.text
 
 
@@ -141,6 +148,7 @@ def test_my_teams_rows_are_marked_and_its_private_ones_stand_on_its_own_board_al
         builders.submit(owner, data, method=name, visibility=visibility)
     builders.score_all()
     assert b"Secret" not in client.get("/board/test/").content
+    ring = row_of(get(client), "Foo").one("circle", class_="ring").attributes
     seen = {}
     for user in (owner, teammate, stranger):
         client.force_login(user)
@@ -149,6 +157,8 @@ def test_my_teams_rows_are_marked_and_its_private_ones_stand_on_its_own_board_al
             "mine" in row_of(root, "Foo").classes,
             "private" in root.one("table", class_="board").one("tbody").text,
         )
+        assert ("6 results, 1 private" in root.one("main").text) == (user != stranger)
+        assert row_of(root, "Foo").one("circle", class_="ring").attributes == ring, "on the public scale"
     assert seen == {"Owls": (True, True), "Mate": (True, True), "Strangers": (False, False)}
 
 

@@ -29,6 +29,7 @@ def test_ladder_begins_with_the_best_whatever_the_board_is_sorted_by() -> None:
         (3, 2, 3),
     ]
     assert (ladder.n_certain, ladder.n_ranks, ladder.n_left_out) == (1, 3, 0)
+    assert not ladder.is_certain
 
 
 def test_private_rows_and_rows_without_a_range_are_no_steps() -> None:
@@ -48,3 +49,4 @@ def test_a_long_board_says_how_many_methods_are_left_out() -> None:
     ladder = rank_ladder([entry(rank, rank, rank) for rank in range(1, MAX_STEPS + 3)], primary="mid")
     assert ladder is not None
     assert (len(ladder.steps), ladder.n_left_out) == (MAX_STEPS, 2)
+    assert ladder.is_certain, "also of those left out"
