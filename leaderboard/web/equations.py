@@ -6,7 +6,7 @@ from typing import Final
 from django.utils.html import escape
 
 _TOKEN: Final = re.compile(r"\\text\{[^}]*\}|\\[A-Za-z]+|[0-9][0-9.,]*|\S")
-_GREEK: Final = {"alpha": "α", "delta": "δ", "theta": "θ", "tau": "τ", "Phi": "Φ"}
+_GREEK: Final = {"alpha": "α", "delta": "δ", "nu": "ν", "theta": "θ", "tau": "τ", "Phi": "Φ"}
 _OPERATORS: Final = {"-": "−", r"\cdot": "·", r"\sum": "∑", **{each: each for each in "+=|/±≥"}}
 _SYMBOLS: Final = {
     **{rf"\{name}": f"<mi>{letter}</mi>" for name, letter in _GREEK.items()},
