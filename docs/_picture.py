@@ -1,5 +1,7 @@
 """Draw docs/figures/architecture.svg from the imports of the code: `python -m docs._picture`.
 
+The other figures there, drawn by `tsttc baseline show`, get the colours of a dark page beside their own.
+
 The rows are the layers of `pyproject.toml`, the arrows are imports between rooms. An import that a longer way
 of arrows shows as well is left out, else the picture would be a thicket.
 """
@@ -7,10 +9,13 @@ of arrows shows as well is left out, else the picture would be a thicket.
 import ast
 import tomllib
 from collections.abc import Mapping
+from dataclasses import astuple
 from html import escape
 from pathlib import Path
 
 import grimp
+
+from tsttc_baselines.drawing import THEMES
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 PICTURE = REPOSITORY / "docs" / "figures" / "architecture.svg"
@@ -107,5 +112,19 @@ def _purpose(room: str) -> str:
     return (ast.get_docstring(ast.parse(source.read_text(encoding="utf-8"))) or "").partition("\n")[0]
 
 
+def with_both_schemes(drawn: str) -> str:
+    """Let a figure in the light colours follow the reader's scheme."""
+    light, dark = (astuple(THEMES[name]) for name in ("light", "dark"))
+    rules = "".join(
+        f'[fill="{old}"]{{fill:{new}}}[stroke="{old}"]{{stroke:{new}}}'
+        for old, new in zip(light, dark, strict=True)
+    )
+    style = f"<style>@media (prefers-color-scheme:dark){{{rules}}}</style>"
+    return drawn if style in drawn else drawn.replace("</title>", f"</title>\n{style}", 1)
+
+
 if __name__ == "__main__":
     PICTURE.write_text(svg(), encoding="utf-8")
+    for path in PICTURE.parent.glob("*.svg"):
+        if path != PICTURE:
+            path.write_text(with_both_schemes(path.read_text(encoding="utf-8")), encoding="utf-8")

@@ -29,8 +29,8 @@ document.addEventListener("click", async ({ target }) => {
   setTimeout(() => (label.data = "Copy"), SHOWN_MS);
 });
 
-// The documentation has many examples: each gets its button, in room that the stylesheet keeps.
-for (const example of document.querySelectorAll(".docs pre:has(code)")) {
+// The documentation has many examples: each gets its button, in room that the stylesheet keeps. Outputs get none.
+for (const example of document.querySelectorAll(".docs pre:has(code:not(.aligned, .language-console, .language-text))")) {
   const button = document.createElement("button");
   button.type = "button";
   button.className = "copy";

@@ -123,7 +123,7 @@ class ErrorSerializer(serializers.Serializer[Any]):
     type = serializers.CharField(help_text="URL of the explanation of the code.")
     title = serializers.CharField(help_text="Name of the HTTP status.")
     status = serializers.IntegerField(help_text="HTTP status.")
-    code = serializers.CharField(help_text="Stable code for programs, listed in docs/api.md.")
+    code = serializers.CharField(help_text="Stable code for programs.")
     detail = serializers.CharField(help_text="What is wrong, what was found and what was expected.")
     problems = ProblemSerializer(many=True, help_text="Every problem found.")
 

@@ -6,7 +6,7 @@ from typing import Final
 from django.utils.html import escape
 
 _TOKEN: Final = re.compile(r"\\text\{[^}]*\}|\\[A-Za-z]+|[0-9][0-9.,]*|\S")
-_GREEK: Final = {"alpha": "α", "delta": "δ", "theta": "θ", "tau": "τ", "Phi": "Φ"}
+_GREEK: Final = {"alpha": "α", "delta": "δ", "nu": "ν", "theta": "θ", "tau": "τ", "Phi": "Φ"}
 _OPERATORS: Final = {"-": "−", r"\cdot": "·", r"\sum": "∑", **{each: each for each in "+=|/±≥"}}
 _SYMBOLS: Final = {
     **{rf"\{name}": f"<mi>{letter}</mi>" for name, letter in _GREEK.items()},
@@ -23,13 +23,13 @@ _COMMANDS: Final = {
 }
 
 
-def mathml(tex: str) -> str:
-    r"""Return the equation, on a line of its own. Raises `ValueError` for a command that is not known.
+def mathml(tex: str, *, display: str = "block") -> str:
+    r"""Return the equation, on a line of its own or `inline`. Raises `ValueError` for an unknown command.
 
     >>> mathml(r"\hat{x}_1")[22:-7]
     '<msub><mover accent="true"><mi>x</mi><mo stretchy="false">^</mo></mover><mn>1</mn></msub>'
     """
-    return f'<math display="block">{_row(_TOKEN.findall(tex)[::-1])}</math>'
+    return f'<math display="{display}">{_row(_TOKEN.findall(tex)[::-1])}</math>'
 
 
 def _row(tokens: list[str]) -> str:

@@ -16,8 +16,12 @@ from leaderboard.web import equations
 Target = Callable[[str], str]
 # Where links may lead: pages of any host, mail, and places on this site.
 _TARGET: Final = re.compile(r"(?:https?:|mailto:|/|#|\?)", re.IGNORECASE)
-# Figures below each other, or words behind formulas: lines that must not wrap.
+# Figures below each other, or words behind formulas: lines that must not wrap, where they are an output.
 _IN_COLUMNS: Final = re.compile(r"\S {3,}\S")
+_OUTPUTS: Final = {"", "console", "text"}
+# An option of a command, which a browser would break at its hyphens.
+_CODE: Final = re.compile(r"<code\b.*?</code>", re.DOTALL)
+_OPTION: Final = re.compile(r"(?<=[\s>\[])--?[a-z][\w-]*")
 _TABLE: Final = '<div class="scroll" tabindex="0" role="group" aria-label="Table">\n<table class="list">\n'
 
 
@@ -68,7 +72,16 @@ def guide(text: str, *, link: Target, image: Callable[[str], Mapping[str, str]])
             token.type, token.content = "html_block", equations.mathml(token.content)
         if token.children and [child.type for child in token.children] == ["image"]:
             token.children = _linked(token.children[0])
+        _typeset(token.children or [])
     return _document(tokens, _parser(images=True))
+
+
+def _typeset(children: Sequence[Token]) -> None:
+    """Turn $`code`$ into an equation within its line."""
+    for before, code, after in zip(children, children[1:], children[2:], strict=False):
+        if code.type == "code_inline" and before.content.endswith("$") and after.content.startswith("$"):
+            before.content, after.content = before.content[:-1], after.content[1:]
+            code.type, code.content = "html_inline", equations.mathml(code.content, display="inline")
 
 
 def _linked(figure: Token) -> list[Token]:
@@ -113,7 +126,7 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
             token.attrSet("id", heading.anchor)
         elif token.type in {"fence", "code_block"}:
             code.append(token.content)
-            if _IN_COLUMNS.search(token.content):
+            if token.info in _OUTPUTS and _IN_COLUMNS.search(token.content):
                 # Of a fence the attributes stand at the code within, beside the button that copies it.
                 token.type, token.attrs = "fence", {**token.attrs, "class": "aligned", "tabindex": 0}
         elif token.type == "inline" and tokens[at - 1].type != "heading_open":
@@ -125,6 +138,7 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
                 token.tag = tokens[at + 2].tag = "td"  # a head without words names nothing
     parts.append(Part(heading, " ".join(filter(None, [*texts, *code]))))
     html = parser.renderer.render(tokens, parser.options, {})
+    html = _CODE.sub(lambda code: _OPTION.sub(r'<span class="together">\g<0></span>', code[0]), html)
     html = html.replace("<table>\n", _TABLE).replace("</table>", "</table>\n</div>")
     # The parser escapes what is no markup of its own.
     drawn = SafeString(html)

@@ -11,8 +11,8 @@ from evaluator.problems import PROBLEM_CODES
 from leaderboard.errors.problem_codes import API_CODES
 
 Node = dict[str, Any]
-# What drf-spectacular appends for a choice without a label of its own.
-_BARE_CHOICE: Final = re.compile(r"^\* `([^`]+)` - \1$", re.MULTILINE)
+# What drf-spectacular appends for a choice whose label is its name, in any case.
+_BARE_CHOICE: Final = re.compile(r"^\* `([^`]+)` - \1$", re.MULTILINE | re.IGNORECASE)
 
 
 @cache

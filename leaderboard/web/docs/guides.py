@@ -23,7 +23,7 @@ _NAMES: Final = {"index": "overview", "api": "api-guide", "adr/README": "decisio
 # The sections of the navigation: titles, and names of guides.
 _SECTIONS: Final[dict[str, dict[str, str]]] = {
     "For researchers": {
-        "Quick start": "researchers",
+        "Quick start for researchers": "researchers",
         "Baselines": "baselines",
         "Deep Scale": "deep-scale",
         "Models": "models",
@@ -35,6 +35,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "API": "api-guide",
         "API reference": "",
         "Exports": "exports",
+        "Permissions": "access",
         "FAQ": "faq",
         "Compared with other leaderboards": "peers",
     },
@@ -42,14 +43,13 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Scoring": "scoring",
         "Uncertainty": "uncertainty",
         "Editions": "editions",
-        "Software changelog": "changelog",
+        "Changelog": "changelog",
     },
     "For maintainers": {
-        "Quick start": "maintainers",
+        "Quick start for maintainers": "maintainers",
         "Operations": "operations",
         "Host another dataset": "another-dataset",
         "Capacity": "capacity",
-        "Permissions": "access",
         "Security": "security",
         "Reliability": "reliability",
     },

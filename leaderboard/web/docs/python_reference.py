@@ -168,7 +168,7 @@ def _wrapped(shown: str, parts: list[str], result: str) -> str:
 
 
 def _code(signature: str) -> Iterator[str]:
-    yield from ("```python", signature, "```", "")
+    yield from ("```text", signature, "```", "")
 
 
 def _words(docstring: str | None) -> Iterator[str]:

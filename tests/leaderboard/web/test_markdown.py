@@ -72,13 +72,22 @@ def test_code_in_columns_is_a_box_that_scrolls_and_other_code_wraps() -> None:
     boxed = '<code class="aligned" tabindex="0">a    1'
     for text in ("```\na    1\nbb   2\n```\n", "    a    1\n    bb   2\n"):
         assert boxed in markdown.page(text).html
-    assert "aligned" not in markdown.page("```sh\ntsttc check a.json --manifest b.csv\n```\n").html
+    assert "aligned" not in markdown.page("```sh\ntsttc check a.json    # --manifest\n```\n").html
+
+
+def test_an_option_of_a_command_does_not_break_at_its_hyphens() -> None:
+    for text in ("`tsttc check --manifest`", "```sh\ntsttc check --manifest\n```\n"):
+        assert '<span class="together">--manifest</span>' in markdown.page(text).html
 
 
 def test_an_equation_of_a_guide_is_mathml_and_one_of_a_maintainer_is_text() -> None:
     text = "```math\n\\frac{1}{\\hat{\\tau}}\n```"
     drawn = markdown.guide(text, link=str, image=lambda _: {}).html
     assert drawn.startswith('<math display="block"><mfrac><mn>1</mn><mover accent="true"><mi>τ</mi>')
+    assert (
+        '<p>With <math display="inline"><mi>τ</mi></math>.'
+        in markdown.guide("With $`\\tau`$.", link=str, image=lambda _: {}).html
+    )
     assert "<math" not in markdown.page(text).html
     with pytest.raises(ValueError, match=r"sin' is not known in an equation"):
         equations.mathml(r"\sin")

@@ -27,7 +27,7 @@ def described() -> Iterator[tuple[str, dict[str, str]]]:
 
 def words(node: dict[str, str]) -> str:
     """A description as the page shows it: no backticks, and no choices that repeat their names."""
-    about = re.sub(r"^\* `([^`]+)` - \1$", "", node["description"], flags=re.MULTILINE)
+    about = re.sub(r"^\* `([^`]+)` - \1$", "", node["description"], flags=re.MULTILINE | re.IGNORECASE)
     return " ".join(about.replace("`", "").split())
 
 
