@@ -46,8 +46,8 @@ def test_verdict_comes_first_then_every_difference_with_interval_and_p(
     builders.infer_all()
     root = get(client, near.method_id, far.method_id)
     verdict = root.one("p", class_="verdict").text
-    assert verdict.startswith(f"{near.method.name}'s MiD is ")
-    assert f"lower than {far.method.name}'s (95% confidence interval: " in verdict
+    assert verdict.startswith(f"The MiD of {near.method.name} is ")
+    assert f"lower than that of {far.method.name} (95% confidence interval: " in verdict
     lead = root.one("p", class_="others").text
     assert lead.startswith("5 of the 5 other metrics differ"), "the others have too few recordings"
     assert len(root.one("table", class_="differences").all("tr", class_="significant")) == 6
@@ -158,8 +158,8 @@ def test_the_page_says_on_how_few_recordings_the_difference_rests(
     builders.infer_all()
     sentence = get(client, *ids).one("p", class_="influence").text
     assert re.fullmatch(
-        r"Without the \d+ of \d+ recordings that favour M1.05 most, the difference would not be significant"
-        r"(; without \d+, it would have the other sign)?\.",
+        r"The difference stays significant until the \d+ of \d+ recordings most in favour of M1.05 "
+        r"are left out(; without \d+, it has the other sign)?\.",
         sentence,
     ), sentence
 
