@@ -36,15 +36,25 @@
   const CALLS = {
     name: () => (mark) => mark.data.name,
     text: () => (mark) => mark.data.text,
+    rank: () => (name) => name.split(" ")[0],
     number: () => (value) => String(value).replace("-", "−"),
     texts: (places) => (value) => places.find(([place]) => Math.abs(place - value) < 1e-6)?.[1] ?? "",
     // A name begins below its mark. It moves to the left where it would cross the next step or leave the drawing,
-    // and goes where there is no room for it.
-    below: (nexts, chart) => ({ dataIndex, rect, labelRect }) => {
-      const left = rect.x + rect.width / 2;
-      const next = nexts[dataIndex] && chart.convertToPixel({ xAxisIndex: 0, yAxisIndex: 0 }, nexts[dataIndex])[0] - 6;
-      const dx = Math.min(0, Math.min(next ?? Infinity, chart.getWidth() - 8) - left - labelRect.width);
-      return left + dx < 40 ? { x: -1000 } : { hideOverlap: true, dx };
+    // below names before it that it would cover, and goes where there is no room for it.
+    below: (nexts, chart) => {
+      let placed;
+      return ({ dataIndex, rect, labelRect: { width, height } }) => {
+        if (!dataIndex) placed = [];
+        const left = rect.x + rect.width / 2;
+        const next = nexts[dataIndex] && chart.convertToPixel({ xAxisIndex: 0, yAxisIndex: 0 }, nexts[dataIndex])[0] - 6;
+        const dx = Math.min(0, Math.min(next ?? Infinity, chart.getWidth() - 8) - left - width);
+        const [from, to] = [left + dx, left + dx + width];
+        if (from < 40) return { x: -1000 };
+        let y = rect.y + rect.height;
+        while (placed.some((other) => other.from < to && from < other.to && Math.abs(other.y - y) <= height)) y += 2;
+        placed.push({ from, to, y });
+        return { hideOverlap: true, dx, dy: y - rect.y - rect.height };
+      };
     },
     whisker: (ink) => (_, api) => {
       const [x, low] = api.coord([api.value(0), api.value(1)]);

@@ -25,7 +25,7 @@
   }
 
   function draw() {
-    const at = Number(slider.value);
+    const at = slider.max - slider.value; // contact is at the right
     time.textContent = `${at.toFixed(1)} s`;
     slider.setAttribute("aria-valuetext", `${at.toFixed(1)} seconds`);
     const size = 2 / Math.max(at, NEAREST_S); // the size in a picture is the reciprocal of the distance

@@ -49,10 +49,10 @@ def sentence(
 
     `withheld` is the reason for a missing interval, by default too few units.
 
-    >>> sentence("A", "B", name="mid_crucial", difference=Difference(-4.1, -5.3, -2.9, 0.0003))
-    "A's MiD on crucial is 4.1 lower than B's (95% confidence interval: 2.9 to 5.3 lower; p = 0.0003)."
+    >>> sentence("A", "B", name="mid", difference=Difference(-4.1, -5.3, -2.9, 0.0003))
+    'The MiD of A is 4.1 lower than that of B (95% confidence interval: 2.9 to 5.3 lower; p = 0.0003).'
     >>> sentence("A", "B", name="rte", difference=Difference(0.7, 0.2, 1.2, 0.02))  # doctest: +ELLIPSIS
-    "A's RTE is 0.70 percentage points higher than B's (95% confidence interval: 0.20 to 1.20 higher; ...
+    'The RTE of A is 0.70 percentage points higher than that of B (95% confidence interval: 0.20 to 1.20 ...
     """
     column, unit = column_words(name), metric_of(name).unit_of_difference
     if round(difference.difference, decimals) == 0:
@@ -60,8 +60,8 @@ def sentence(
         return f"{alike} {withheld}".rstrip()
     digits = _digits(difference, decimals)
     gap = (
-        f"{_of(first)} {column} is {_amount(difference.difference, digits)}{unit} "
-        f"{_direction(difference.difference)} than {_of(second)}"
+        f"The {column} of {first} is {_amount(difference.difference, digits)}{unit} "
+        f"{_direction(difference.difference)} than that of {second}"
     )
     if withheld:
         return f"{gap}. {withheld}"
@@ -80,10 +80,6 @@ def sentence(
         f"{statement} The difference is not significant. The test detects a difference above "
         f"{_amount(detectable, digits)}{unit} with about 80% power."
     )
-
-
-def _of(name: str) -> str:
-    return f"{name}'" if name.endswith(("s", "S")) else f"{name}'s"
 
 
 def _direction(difference: float) -> str:
@@ -121,23 +117,23 @@ def influence(first: str, second: str, *, difference: Difference) -> str:
     >>> from evaluator.scoring.significance import Influence
     >>> difference = Difference(-0.4, -0.5, -0.2, 0.0003, influence=Influence(700, 39, 59))
     >>> print(influence("A", "B", difference=difference))
-    Without the 39 of 700 recordings that favour A most, the difference would not be significant; without \
-59, it would have the other sign.
+    The difference stays significant until the 39 of 700 recordings most in favour of A are left out; \
+without 59, it has the other sign.
     >>> influence("A", "B", difference=Difference(0.1, -0.2, 0.4, 0.4, influence=Influence(700, None, 2)))
-    'Without the 2 of 700 recordings that favour B most, the difference would have the other sign.'
+    'Without the 2 of 700 recordings most in favour of B, the difference has the other sign.'
     """
     known = difference.influence
     if known is None or not difference.difference:
         return ""
     better = first if difference.difference < 0 else second
-    becomes = {"would not be significant": known.n_to_undecided, "would have the other sign": known.n_to_turn}
-    parts = [(n, words) for words, n in becomes.items() if n is not None]
-    if not parts:
+    few, turn = known.n_to_undecided, known.n_to_turn
+    if few is None and turn is None:
         return ""
-    (n, words), *rest = parts
-    of_all = in_words(difference.unit, known.n_units)
-    head = f"Without the {n:,} of {of_all} that favour {better} most, the difference"
-    return "; ".join([f"{head} {words}", *(f"without {n:,}, it {words}" for n, words in rest)]) + "."
+    of_all, most = in_words(difference.unit, known.n_units), f"most in favour of {better}"
+    if few is None:
+        return f"Without the {turn:,} of {of_all} {most}, the difference has the other sign."
+    head = f"The difference stays significant until the {few:,} of {of_all} {most} are left out"
+    return f"{head}." if turn is None else f"{head}; without {turn:,}, it has the other sign."
 
 
 def selection(n_tried: Mapping[str, int]) -> str:

@@ -69,7 +69,7 @@ def _measured(n_frames: int, **others: object) -> Mapping[str, object]:
         "box_source": "GIVEN",
         "uses_nerf": False,
         "uses_extra_data": False,
-        "hardware": "one processor core, shared",
+        "hardware": "one shared CPU core",
         "n_frames": n_frames,
         **others,
     }
@@ -104,7 +104,7 @@ ENTRIES = (
     DemoEntry(
         team="Baselines on pixels",
         method="Pixel MSE, as in the paper",
-        description="The scale at which the reference frame looks most like the target, worded by the paper.",
+        description="The scale at which the reference frame looks most like the target, as in the paper.",
         run=get_run("pixel-mse"),
         details=_measured(2, latency_ms=5.7, paper_url=_PAPER),
     ),
@@ -142,9 +142,9 @@ ENTRIES = (
         team="Baselines on pixels",
         method="Deep Scale features, own fit",
         description=(
-            "A fit of the features of the paper's network, which is this project's own and not the paper's "
-            "estimator. The weights come with this project and were trained on other rendered sequences, and "
-            "on nothing else: on the road, the method is worse than here."
+            "This project's own fit on features of the paper's network, not the paper's estimator. The "
+            "weights come with this project and were trained on other rendered sequences, and on nothing "
+            "else: expect larger errors on real footage."
         ),
         run=get_run("deep-scale"),
         details=_measured(2, latency_ms=150, n_parameters=83_832, paper_url=_PAPER),

@@ -74,8 +74,11 @@ def ticked(text: str) -> SafeString:
     >>> ticked("The envelope has no `predictions`.")
     'The envelope has no <code>predictions</code>.'
     """
-    parts = text.split("`")
-    pieces = (part if i % 2 == 0 else format_html("<code>{}</code>", part) for i, part in enumerate(parts))
+    return _alternating(text.split("`"), "<code>{}</code>")
+
+
+def _alternating(parts: Iterable[str], every_second: str) -> SafeString:
+    pieces = (part if i % 2 == 0 else format_html(every_second, part) for i, part in enumerate(parts))
     return format_html_join("", "{}", ((piece,) for piece in pieces))
 
 
@@ -93,7 +96,11 @@ def paragraphs(text: str) -> SafeString:
 
 def _paragraph(text: str) -> SafeString:
     if len(text) > 6 and text.startswith("```") and text.endswith("```"):
-        return format_html("<pre><code>{}</code></pre>", text[3:-3].strip())
+        # A line does not break between an option's hyphens and its name.
+        pieces = re.split(r"(?<=\s)(--[\w-]+)", text[3:-3].strip())
+        return format_html(
+            "<pre><code>{}</code></pre>", _alternating(pieces, '<span class="together">{}</span>')
+        )
     lines = ((ticked(line),) for line in text.split("\n"))
     return format_html("<p>{}</p>", format_html_join(SafeString("<br>"), "{}", lines))
 
@@ -106,8 +113,7 @@ def with_bold_names(sentence: str, names: Collection[str]) -> SafeString:
     """
     choices = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
     parts = re.split(rf"(?<!\w)({choices})(?!\w)", sentence)
-    pieces = (part if i % 2 == 0 else format_html("<b>{}</b>", part) for i, part in enumerate(parts))
-    return format_html_join("", "{}", ((piece,) for piece in pieces))
+    return _alternating(parts, "<b>{}</b>")
 
 
 def breakable(path: str) -> SafeString:

@@ -106,8 +106,8 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     page.wait_for_url("**/compare/?*")
     expect(page.locator(".verdict")).to_contain_text("being computed")
     with worker(site):
-        expect(page.locator(".verdict")).to_contain_text("By keyboard's MiD is ")
-    expect(page.locator(".verdict")).to_contain_text("lower than By somebody else's (95% confidence")
+        expect(page.locator(".verdict")).to_contain_text("The MiD of By keyboard is ")
+    expect(page.locator(".verdict")).to_contain_text("lower than that of By somebody else (95% confidence")
     tab_to(page, "Test", backwards=True)
     press("Enter")
     page.wait_for_url("**/board/test/")

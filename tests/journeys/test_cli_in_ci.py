@@ -136,7 +136,7 @@ def test_worse_method_fails_the_gate_and_the_better_one_is_shown(job: Job) -> No
     assert json.loads(worse.stdout)["gate"]["code"] == "gate-failed"
     compared = job.tsttc("compare", "Steady", "Shaky")
     assert compared.returncode == 0, compared.stderr
-    assert "Steady's MiD is " in compared.stdout
+    assert "The MiD of Steady is " in compared.stdout
     assert "is not public, and the ground truth of test is hidden" in compared.stdout
     anybody = command(job.site.url, "", home=job.home)
     assert "Steady" not in anybody("board").stdout

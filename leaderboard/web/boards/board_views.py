@@ -61,7 +61,7 @@ def render_board(
         "profile": None
         if shown.at or chart_views.has_progress(shown)
         else chart_views.profile(shown, n_metrics=1 if ladder and not ladder.is_certain else 2),
-        "n_profiles": chart_views.N_PROFILES,
+        "n_profiles": chart_views.n_profiles(shown),
         "progress_label": f"{primary} of each method by date, with the lowest {primary} so far.",
         "n_withdrawn": sum(entry.withdrawn_at is not None for entry in shown.unfiltered),
     }

@@ -30,11 +30,15 @@ from leaderboard.web.charts.chart_series import Look, marks, named_marks, stairc
 
 # Below the front, where its names are: this part of the whole height.
 _ROOM: Final = 0.15
+# Before the fastest, so that no mark lies on the axis.
+_BESIDE: Final = 0.03
 SUBMITTED, QUOTED = "Submissions", "Published results"
 # Behind a front. More marks are a blot, and a board of ten thousand made a page of 7 MB of them.
 MAX_BEHIND: Final = 500
 # Fewer are no progress: a line straight up.
 MIN_DATES: Final = 3
+# Fewer have no front worth a drawing.
+_MIN_LATENCIES: Final = 3
 
 
 # --- a front and what lies behind it ---------------------------------------------------------------------
@@ -258,7 +262,7 @@ def _time_title(first: datetime, last: datetime) -> str:
 
 
 def latency(entries: Sequence[Entry], *, metric: Metric) -> Chart:
-    """Draw the metric that ranks against latency, with the Pareto front."""
+    """Draw the metric that ranks against latency, with the Pareto front; empty with few latencies."""
     points, note = _drawn(
         _with_front(
             (
@@ -274,12 +278,12 @@ def latency(entries: Sequence[Entry], *, metric: Metric) -> Chart:
         ),
         metric,
     )
-    if not points:
+    if len(points) < _MIN_LATENCIES:
         return empty("latency")
     last = max(each.x for each in points if each.is_front)
     series, names = _front_series(points, metric, line="Pareto front", praise="on the Pareto front", end=last)
     frame = Frame(
-        x_axes=[x_axis("Latency in ms (log scale)", log_axis(each.x for each in points))],
+        x_axes=[x_axis("Latency in ms (log scale)", log_axis((each.x for each in points), room=_BESIDE))],
         y_axes=[error_axis(metric, [each.y for each in points], room=_ROOM)],
         series=series,
         names=names,

@@ -214,6 +214,7 @@ class Frame:
     more: Mapping[str, Any] = field(default_factory=dict)
     # What differs in each series where it is wide, and where it is narrow.
     series_by_width: tuple[Sequence[Option], Sequence[Option]] = ((), ())
+    y_labels_by_width: tuple[Option, Option] = ({}, {})
 
     def options(self) -> Option:
         """Return the options of panels side by side, which stack on a narrow screen."""
@@ -233,11 +234,15 @@ class Frame:
         narrow = {"maxWidth": max(NARROW_PX, NARROW_PX * n_panels // 2)}
         media: list[Option] = [{"option": self._layout(n_panels, is_narrow=False)}]
         media.append({"query": narrow, "option": self._layout(n_panels, is_narrow=True)})
+        # A legend has more lines in the narrowest windows.
+        media.append(
+            {"query": {"maxWidth": 350}, "option": self._layout(n_panels, is_narrow=True, legend_px=290)}
+        )
         return {"baseOption": base, "media": media}
 
-    def _layout(self, n_panels: int, *, is_narrow: bool) -> Option:
+    def _layout(self, n_panels: int, *, is_narrow: bool, legend_px: int = 348) -> Option:
         left = self.left[is_narrow]
-        top = 38 + self.top + 22 * self._n_legend_lines(320 if is_narrow else NARROW_PX)
+        top = 38 + self.top + 24 * self._n_legend_lines(legend_px if is_narrow else NARROW_PX)
         layout = {"legend": self._legend(), "grid": _grids(n_panels, left=left, top=top, is_narrow=is_narrow)}
         if self.series_by_width[is_narrow]:
             layout["series"] = list(self.series_by_width[is_narrow])
@@ -247,15 +252,19 @@ class Frame:
             layout["xAxis"] = [{"id": f"x{number}", "name": name} for number, name in enumerate(names)]
         if left == _LEFT_PX:
             return layout
-        return layout | {"yAxis": [{"axisLabel": {"width": left - 16}} for _ in self.y_axes]}
+        return layout | {
+            "yAxis": [
+                {"axisLabel": {"width": left - 16, **self.y_labels_by_width[is_narrow]}} for _ in self.y_axes
+            ]
+        }
 
     def _n_legend_lines(self, width_px: int) -> int:
-        # Half an em for each letter.
-        n_lines, used_px = 0, width_px
+        # A little more than half an em for each letter.
+        n_lines, used_px = 0, float(width_px)
         for name in self.names:
-            needed_px = 38 + min(_MAX_NAME_PX, 7 * len(name))
+            needed_px = 33 + min(_MAX_NAME_PX, 6.4 * len(name))
             if used_px + needed_px > width_px:
-                n_lines, used_px = n_lines + 1, 0
+                n_lines, used_px = n_lines + 1, 0.0
             used_px += needed_px
         return n_lines
 

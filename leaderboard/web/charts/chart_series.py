@@ -62,8 +62,7 @@ def named_marks(name: str, front: Sequence[Mark], chosen: Iterable[int], look: L
         "distance": 6,
         "align": "left",
         "formatter": call("name"),
-        "textBorderColor": "--ground",
-        "textBorderWidth": 3,
+        "backgroundColor": "--ground",
     }
     return series | {"data": items, "label": label, "labelLayout": call("below", nexts)}
 

@@ -1,5 +1,6 @@
 """The page of a board's charts, and one chart's options for other pages."""
 
+import math
 from collections.abc import Sequence
 from datetime import datetime
 
@@ -34,16 +35,20 @@ def charts(request: HttpRequest, split: str) -> HttpResponse:
 
 
 def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpResponse:
+    n_waiting = sum(pair.differences is None for pair in pairs)
     context = {
         "board": board,
         "progress": progress(board, now=timezone.now()),
         "latency": board_charts.latency(_public(board), metric=board.rules.primary),
         "profile": profile(board),
-        "n_profiles": N_PROFILES,
+        "n_profiles": n_profiles(board),
         "range_leaders": range_leaders(board),
         "significance": significance_chart.significance(pairs, split=board.split.pk),
-        "is_computing": any(pair.differences is None for pair in pairs),
-        "n_first": comparisons.N_FIRST,
+        "n_pairs": len(pairs),
+        "n_waiting": n_waiting,
+        # A map of empty cells says less than a sentence.
+        "is_early": 2 * n_waiting > len(pairs),
+        "n_first": comparisons.N_FIRST if len(pairs) == math.comb(comparisons.N_FIRST, 2) else 0,
         "resolution": sentences.resolution(
             [pair.differences or {} for pair in comparisons.neighbours(pairs)],
             decimals=board.edition.decimals if board.edition else 2,
@@ -71,6 +76,11 @@ def has_progress(board: Board) -> bool:
 def profile(board: Board, *, n_metrics: int | None = None) -> Chart:
     """Draw the errors by TTC range of the first public rows of a board."""
     return profile_chart.profile(_public(board)[:N_PROFILES], n_metrics=n_metrics)
+
+
+def n_profiles(board: Board) -> int:
+    """Return how many rows the chart of errors draws of more; 0 if it draws them all."""
+    return N_PROFILES if len(_public(board)) > N_PROFILES else 0
 
 
 def _public(board: Board) -> list[Entry]:

@@ -18,7 +18,7 @@ from leaderboard.web.charts.chart_options import Chart, Frame, Mark, Option, cal
 from leaderboard.web.charts.chart_series import cells
 from leaderboard.web.formatting import signed
 
-_FEW, _FEW_ON_A_PHONE = 8, 5
+_FEW, _FEW_ON_A_PHONE = 8, 7
 SIGNIFICANT: Final = {0.001: "p < 0.001", 0.01: "p < 0.01", 0.05: "p < 0.05"}
 UNDECIDED, COMPUTING = "not significant", "computing…"
 ANONYMOUS, UNTESTED = "no test (anonymous)", "no test"
@@ -98,7 +98,9 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
             [{"label": {"show": len(entries) <= _FEW_ON_A_PHONE}} for _ in verdicts],
         ),
         names=verdicts,
-        left=(220, 120),
+        # On a phone the rank names a row: names cut to their beginnings would be alike.
+        left=(220, 36),
+        y_labels_by_width=({"formatter": "{value}"}, {"formatter": call("rank")}),
         top=30,
     )
     return Chart(

@@ -1,14 +1,14 @@
-"""Differences with their intervals as small SVG drawings on one symmetric scale, next to the numbers."""
+"""Differences with their intervals as small SVG drawings on one scale, next to the numbers."""
 
 import math
 from collections.abc import Iterable
 from typing import Final
 
-from django.utils.html import format_html
+from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
 
-_WIDTH_PX: Final = 150.0
-_MARGIN_PX: Final = 4.0
+# In percent of the width.
+_MARGIN: Final = 3.0
 _STEPS: Final = (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0)
 
 
@@ -37,40 +37,48 @@ def scale_end(values: Iterable[float]) -> float:
     return round_ticks(0.0, far, n=4)[-1]
 
 
-def _x(value: float, end: float) -> str:
-    share = (value + end) / (2 * end)
-    return f"{round(_MARGIN_PX + (_WIDTH_PX - 2 * _MARGIN_PX) * share, 1):g}"
+def _x(value: float, end: float, start: float) -> str:
+    share = (value - start) / (end - start)
+    return f"{round(_MARGIN + (100 - 2 * _MARGIN) * share, 1):g}%"
 
 
-def difference(end: float, value: float, low: float | None, high: float | None) -> SafeString:
-    """Draw a dot with its interval as a line, or a ring without one, and the line at 0."""
+def difference(
+    end: float, value: float, low: float | None, high: float | None, *, start: float | None = None
+) -> SafeString:
+    """Draw a dot with its interval as a line, or a ring without one, and the line at 0.
+
+    The scale begins at `start`, by default as far below 0 as its end is above.
+    """
+    start = -end if start is None else start
     line, css = SafeString(""), "ring"
     if low is not None and high is not None:
-        left, right = _x(low, end), _x(high, end)
-        line, css = format_html('<path d="M{0} 7H{1}M{0} 4v6M{1} 4v6"/>', left, right), "dot"
+        template = '<line x1="{0}" x2="{1}" y1="7" y2="7"/>' + "".join(
+            f'<line x1="{{{i}}}" x2="{{{i}}}" y1="4" y2="10"/>' for i in (0, 1)
+        )
+        line, css = format_html(template, _x(low, end, start), _x(high, end, start)), "dot"
     return format_html(
-        '<svg class="whisker" viewBox="0 0 {} 14" aria-hidden="true">'
-        '<path class="zero" d="M{} 0v14"/>{}<circle class="{}" cx="{}" cy="7" r="2.6"/></svg>',
-        f"{_WIDTH_PX:g}",
-        _x(0.0, end),
+        '<svg class="whisker" aria-hidden="true"><line class="zero" x1="{0}" x2="{0}" y1="0" y2="14"/>{1}'
+        '<circle class="{2}" cx="{3}" cy="7" r="2.4"/></svg>',
+        _x(0.0, end, start),
         line,
         css,
-        _x(value, end),
+        _x(value, end, start),
     )
 
 
-def axis(end: float) -> SafeString:
+def axis(end: float, *, start: float | None = None) -> SafeString:
     """Draw the scale for the head of a column."""
+    start = -end if start is None else start
+    stops = [_x(at, end, start) for at in (start, 0.0, end)]
+    ticks = format_html_join("", '<line x1="{0}" x2="{0}" y1="11" y2="14"/>', ((at,) for at in stops))
     return format_html(
-        '<svg class="axis" viewBox="0 0 {width} 14" aria-hidden="true">'
-        '<path d="M{left} 14H{right}M{left} 11v3M{middle} 11v3M{right} 11v3"/>'
-        '<text x="0" y="9">{low}</text><text x="{width}" y="9" text-anchor="end">{high}</text></svg>',
-        width=f"{_WIDTH_PX:g}",
-        left=_x(-end, end),
-        middle=_x(0.0, end),
-        right=_x(end, end),
-        low=tick_text(-end),
-        high=tick_text(end),
+        '<svg class="axis" aria-hidden="true"><line x1="{}" x2="{}" y1="14" y2="14"/>{}'
+        '<text x="0" y="9">{}</text><text x="100%" y="9" text-anchor="end">{}</text></svg>',
+        stops[0],
+        stops[2],
+        ticks,
+        tick_text(start),
+        tick_text(end),
     )
 
 

@@ -26,7 +26,7 @@ from leaderboard.web.compare.difference_matrix import (
 )
 from leaderboard.web.formatting import figure_css, signed, with_bold_names
 
-_NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
+_NUMBERS: Final = {2: "two", 3: "three", 4: "four", 5: "five"}
 
 
 def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, Any]:
@@ -37,7 +37,7 @@ def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, 
     )
     return {
         "compared": compared,
-        "title": f"{_NUMBERS.get(len(names), 'Two').capitalize()} methods compared",
+        "title": f"{_NUMBERS[len(names)].capitalize()} methods compared",
         "verdict": with_bold_names(verdict(compared), names),
         "matrix": difference_matrix(compared),
         "metric": metric_of(compared.entries[0].primary),
@@ -65,7 +65,14 @@ def verdict(compared: Compared) -> str:
         few = in_words(compared.edition.unit)
         return f"{head} There are too few {few} for confidence intervals and p-values."
     relations = (("significantly better than", worse), ("not significantly better than", alike))
-    parts = [f"{relation} {get_text_list(names, 'and')}" for relation, names in relations if names]
+    all_others = len(compared.entries) - 1
+    parts = [
+        f"{relation} the other {_NUMBERS[all_others]}"
+        if len(names) == all_others
+        else f"{relation} {get_text_list(names, 'and')}"
+        for relation, names in relations
+        if names
+    ]
     together = f", with all {len(tested)} pairs tested together," if len(tested) > 1 else ""
     lines = [head, f"On these recordings{together} it is {', and '.join(parts)}."] if parts else [head]
     return " ".join([*lines, *dict.fromkeys(pair.withheld for pair in compared.pairs if pair.withheld)])

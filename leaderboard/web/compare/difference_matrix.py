@@ -24,14 +24,12 @@ class MatrixCell(NamedTuple):
 
 
 class ForestRow(NamedTuple):
-    """The difference of one method to the best, with its interval drawn."""
+    """The interval of the difference of one method from the best, as text and drawn."""
 
     entry: Entry
-    difference: str
     drawing: SafeString
     interval: str
     p: str
-    is_significant: bool
 
 
 class Matrix(NamedTuple):
@@ -92,7 +90,7 @@ def difference_matrix(compared: Compared) -> Matrix | None:
         (row, tuple(_cell(row, column, differences, significant) for column in entries)) for row in entries
     )
     n_tested = sum(each.p_below is not None for each in differences.values()) // 2
-    return Matrix(rows, *_forest(entries, differences, significant), n_tested)
+    return Matrix(rows, *_forest(entries, differences), n_tested)
 
 
 def _cell(
@@ -114,9 +112,7 @@ def _cell(
 
 
 def _forest(
-    entries: Sequence[Entry],
-    differences: Mapping[tuple[str, str], Difference],
-    significant: Collection[frozenset[str]],
+    entries: Sequence[Entry], differences: Mapping[tuple[str, str], Difference]
 ) -> tuple[tuple[ForestRow, ...], SafeString]:
     best, *others = entries
     to_best = [
@@ -127,18 +123,19 @@ def _forest(
     end = svg.scale_end(
         value for _, each in to_best for value in (each.low, each.high, each.difference) if value is not None
     )
+    # None is better than the best: the scale begins at 0, or where an interval does.
+    below = [-each.low for _, each in to_best if each.low is not None and each.low < 0]
+    start = -svg.scale_end(below) if below else 0.0
     rows = tuple(
         ForestRow(
             entry=entry,
-            difference=signed(each.difference, decimals=entry.decimals),
-            drawing=svg.difference(end, each.difference, each.low, each.high),
+            drawing=svg.difference(end, each.difference, each.low, each.high, start=start),
             interval=_interval(each, entry.decimals),
             p=p_cell(each.p, each.p_below),
-            is_significant=frozenset((entry.id, best.id)) in significant,
         )
         for entry, each in to_best
     )
-    return rows, svg.axis(end)
+    return rows, svg.axis(end, start=start)
 
 
 def _interval(difference: Difference, decimals: int) -> str:

@@ -201,7 +201,8 @@ def put_more_documented_answers(site: RecordedSite) -> None:
         for name in SCORE_NAMES
     }
     sentence = (
-        "Foo++'s MiD is 1.18 lower than Bar's (95% confidence interval: 0.62 to 1.73 lower; p = 0.0004)."
+        "The MiD of Foo++ is 1.18 lower than that of Bar "
+        "(95% confidence interval: 0.62 to 1.73 lower; p = 0.0004)."
     )
     compared = {"split": "val", "edition": 2, "is_complete": True, "reason": "", "entries": []}
     pair = {"differences": differences, "sentence": sentence}

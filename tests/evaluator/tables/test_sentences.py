@@ -31,7 +31,7 @@ def test_a_significant_difference_has_both_ends_of_its_interval(
     difference: Difference, amount: str, ends: str
 ) -> None:
     assert sentence_of(difference) == (
-        f"A's MiD is {amount} than B's (95% confidence interval: {ends}; p = {difference.p:.4f})."
+        f"The MiD of A is {amount} than that of B (95% confidence interval: {ends}; p = {difference.p:.4f})."
     )
 
 
@@ -40,15 +40,17 @@ def test_a_significant_difference_has_both_ends_of_its_interval(
     [
         (
             Difference(-0.1, -0.2, 0.0, None, 0.001),
-            "0.1 lower than B's (95% confidence interval: 0.0 to 0.2 lower, rounded outwards; p < 0.001).",
+            "0.1 lower than that of B "
+            "(95% confidence interval: 0.0 to 0.2 lower, rounded outwards; p < 0.001).",
         ),
         (
             Difference(3.6, 0.0, 7.5, None, 0.05),
-            "3.6 higher than B's (95% confidence interval: 0.0 to 7.5 higher, rounded outwards; p < 0.05).",
+            "3.6 higher than that of B "
+            "(95% confidence interval: 0.0 to 7.5 higher, rounded outwards; p < 0.05).",
         ),
         (
             Difference(13.0, 0.0, 26.0, None, 0.05),
-            "13 higher than B's (95% confidence interval: 0 to 26 higher, rounded outwards; p < 0.05).",
+            "13 higher than that of B (95% confidence interval: 0 to 26 higher, rounded outwards; p < 0.05).",
         ),
     ],
 )
@@ -56,7 +58,7 @@ def test_an_interval_of_a_hidden_split_that_ends_at_0_says_why_and_p_judges(
     difference: Difference, words: str
 ) -> None:
     assert difference.is_significant
-    assert sentence_of(difference, decimals=1) == f"A's MiD is {words}"
+    assert sentence_of(difference, decimals=1) == f"The MiD of A is {words}"
 
 
 @pytest.mark.parametrize(
@@ -87,7 +89,7 @@ def test_the_detectable_difference_is_that_of_80_percent_power() -> None:
 
 def test_errors_in_percent_differ_by_percentage_points() -> None:
     text = sentence_of(Difference(0.7, -0.2, 1.6, 0.12), name="rte_small")
-    assert text.startswith("A's RTE on small is 0.70 percentage points higher than B's (95%")
+    assert text.startswith("The RTE on small of A is 0.70 percentage points higher than that of B (95%")
     assert "detects a difference above 1.29 percentage points with" in text
 
 
@@ -128,5 +130,6 @@ def test_where_p_is_hidden_its_class_is_shown(p_below: float, words: str, is_sig
 def test_with_too_few_recordings_a_difference_means_nothing() -> None:
     text = sentence_of(Difference(-0.4, None, None, None))
     assert text == (
-        "A's MiD is 0.40 lower than B's; there are too few recordings to say whether that is significant."
+        "The MiD of A is 0.40 lower than that of B; "
+        "there are too few recordings to say whether that is significant."
     )

@@ -67,8 +67,8 @@ def test_a_comparison_is_asked_for_once_and_answered_by_a_worker(
         overall = known(pair)["mid"]
         assert overall.low <= overall.difference <= overall.high < 0
         assert overall.is_significant
-        assert pair.sentence().startswith(f"{pair.first.method}'s MiD is ")
-        assert pair.sentence("mid_small").startswith(f"{pair.first.method}'s MiD on small is ")
+        assert pair.sentence().startswith(f"The MiD of {pair.first.method} is ")
+        assert pair.sentence("mid_small").startswith(f"The MiD on small of {pair.first.method} is ")
 
 
 def test_the_worker_computes_what_the_evaluator_says_offline(
@@ -141,7 +141,7 @@ def test_an_anonymous_method_is_compared_under_its_pseudonym(entries: list[Submi
     ask(*entries[:2])
     builders.infer_all()
     pseudonym = Method.objects.get(pk=entries[0].method_id).pseudonym
-    assert ask(*entries[:2]).pairs[0].sentence().startswith(f"{pseudonym}'s MiD is ")
+    assert ask(*entries[:2]).pairs[0].sentence().startswith(f"The MiD of {pseudonym} is ")
     assert "M1.05" not in repr(ask(*entries[:2]))
 
 
