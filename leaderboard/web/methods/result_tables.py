@@ -130,7 +130,7 @@ def submission_table(submissions: Iterable[Submission]) -> dict[str, Any]:
     """Return the rows of a team's submissions: overall errors, or why there are none."""
     evaluations = [(submission, evaluation_of(submission)) for submission in submissions]
     errors = dict.fromkeys(metric for _, each in evaluations for metric in each.edition.rules.metrics)
-    names = {metric.name: metric.symbol for metric in errors}
+    names = {metric.name: metric.heading for metric in errors}
     rows = []
     for submission, evaluation in evaluations:
         values, edition = flat_scores(evaluation), evaluation.edition
@@ -138,9 +138,9 @@ def submission_table(submissions: Iterable[Submission]) -> dict[str, Any]:
             (
                 cell_css(name, value, edition.decimals, primary=edition.rules.primary.name),
                 format_rounded(value, decimals=edition.decimals),
-                symbol,
+                heading,
             )
-            for name, symbol in names.items()
+            for name, heading in names.items()
             for value in [values.get(name)]
         ]
         rows.append((submission, evaluation, cells, _reason(evaluation)))
@@ -152,8 +152,8 @@ def _reason(evaluation: Evaluation) -> str:
         return "An error on our side; a maintainer will retry it."
     if evaluation.status != Status.REJECTED or not evaluation.problems:
         return ""
-    # The fault says enough here; what was expected is on the submission's page.
-    message = evaluation.problems[0]["message"].partition("; expected")[0]
+    # The fault says enough here; its places, and what was expected, are on the submission's page.
+    message = evaluation.problems[0]["message"].partition("; expected")[0].partition(": ")[0]
     # Cut between words: the half of a number is another number.
     first = shorten(message, _MAX_REASON, placeholder=" …")
-    return f"{evaluation.n_problems:,} problems: {first}" if evaluation.n_problems > 1 else first
+    return f"{evaluation.n_problems:,} problems, the first: {first}" if evaluation.n_problems > 1 else first

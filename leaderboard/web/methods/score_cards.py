@@ -95,5 +95,5 @@ def citation(card: ScoreCard, *, split: str, edition: int | None) -> str:
     """Word a score as one quotes it: value, interval, rank, and where it is from."""
     interval = f" [{card.interval.replace(' to ', ', ')}]" if card.interval else ""
     rank = f", rank {card.entry.rank} {card.rank_range}".rstrip() if card.entry.rank else ""
-    value = f"{card.metric.symbol} {card.value}{card.metric.unit_of_value}"
-    return f"{value}{interval}{rank}, {split}, edition {edition}"
+    value = f"{card.metric.symbol} {card.value}{interval} {card.metric.unit}".rstrip()
+    return f"{value}{rank}, {split}, edition {edition}"

@@ -1,6 +1,7 @@
 """Tables of a submission's page: numbers, rank, comparison, a row for a paper."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 from urllib.parse import urlencode
 
@@ -53,10 +54,14 @@ def outcome_table(
     card = score_card(
         entry, rows, n_ranked=board_position.n_ranked if board_position else 0, gap=gap_to_best(entry, rows)
     )
+    # A private method has no rank that others could look up.
+    quoted = replace(entry, rank=None) if board_position and board_position.is_supposed else entry
     return {
         "table": result_table(entry, progress.counts),
         "card": card,
-        "citation": citation(card, split=submission.split_id, edition=progress.edition_number)
+        "citation": citation(
+            card._replace(entry=quoted), split=submission.split.title, edition=progress.edition_number
+        )
         if card
         else "",
         "interval_note": interval_note,
@@ -66,7 +71,7 @@ def outcome_table(
         "beside": _comparison_rows(submission, progress, board_position, entry, is_mine=is_mine)
         if board_position
         else [],
-        "latex": tables.latex_row(entry),
+        "latex": tables.latex_row(quoted),
         "latex_order": _order_words(progress.scores),
     }
 
@@ -96,7 +101,7 @@ def _comparison_rows(
             _comparison_row(entry, own)
             | {
                 "href": reverse("submission", args=[own.submission_id]),
-                "about": f"{'your' if is_mine else 'its'} team’s best other method, {own.date_text}",
+                "about": f"{'your' if is_mine else 'its'} team’s best other submission, {own.date_text}",
                 "compare_href": f"{reverse('compare')}?{urlencode(query)}"
                 if is_compared and own.method_id != submission.method_id
                 else "",
@@ -112,26 +117,27 @@ def _comparison_rows(
 def _comparison_row(entry: Entry, other: Entry) -> dict[str, Any]:
     # Differences are this submission minus the row: below 0 it is better.
     decimals, errors = max(entry.decimals, other.decimals), []
-    for name, *_ in grouped_names(entry.scores).values():
+    for metric, (name, *_) in grouped_names(entry.scores).items():
         mine, theirs = entry.scores[name], other.scores[name]
         gap = "" if mine is None or theirs is None else signed(mine - theirs, decimals=decimals)
-        errors.append((format_rounded(theirs, decimals=other.decimals), gap))
+        errors.append((metric, format_rounded(theirs, decimals=other.decimals), gap))
     css = "" if other.decimals >= entry.decimals else f" d{other.decimals}"
     return {"label": other.method, "errors": errors, "css": css}
 
 
 def rejected_sentence(quota: Quota | None) -> str:
-    """Word the cost of a rejected file, and how many more are accepted; empty without a quota.
+    """Word the cost of a rejected file, and how many more are accepted.
 
     >>> from leaderboard.models import QuotaOverride
-    >>> rejected_sentence(Quota("test", QuotaOverride(quota_rejected_limit=20), 0, 3, True, None, ""))
-    'This didn’t count against your quota. 17 more files may be rejected within 24 hours.'
+    >>> rejected_sentence(Quota("test", QuotaOverride(quota_rejected_limit=20), 0, 3, True, None, ""))[63:]
+    'You may have 17 more files rejected in the next 24 hours.'
     """
     if quota is None:
-        return ""
+        return "This file was not scored."
+    cost = "This file was not scored and did not count against your quota."
     limit = quota.rules.quota_rejected_limit
     if limit is None:
-        return "This didn’t count against your quota."
+        return cost
     n_left = max(0, limit - quota.n_rejected)
     more = counted(n_left, "more file")
-    return f"This didn’t count against your quota. {more} may be rejected within 24 hours."
+    return f"{cost} You may have {more} rejected in the next 24 hours."

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Final
 
+from django.utils.text import get_text_list
+
 from leaderboard.models import Evaluation, Status
 from leaderboard.submissions.progress import Progress
 from leaderboard.web.formatting import grouped
@@ -48,6 +50,7 @@ def state_line(
     """Make the status line. `awaits_intervals`: scored, and its intervals are expected."""
     more = "-intervals" if awaits_intervals else ""
     problems = tuple(progress.problems[:MAX_POINTS])
+    cut = f"; the first {MAX_POINTS} are listed" if len(progress.problems) > MAX_POINTS else ""
     is_whole = len(problems) == progress.n_problems
     return StateLine(
         steps=_with_withdrawal(steps(progress, awaits_intervals=awaits_intervals), withdrawn_at),
@@ -55,7 +58,7 @@ def state_line(
         is_moving=awaits_intervals or not progress.is_final,
         truncation=truncation(progress.truncated),
         problems=problems,
-        listing="" if is_whole else f"Identical problems are grouped; the first {MAX_POINTS} are listed.",
+        listing="" if is_whole else f"Identical problems are grouped{cut}.",
     )
 
 
@@ -108,13 +111,13 @@ def truncation(truncated: Mapping[str, int]) -> str:
     """Say how many predictions were truncated at each boundary.
 
     >>> truncation({"-20": 0, "0.05": 1, "20": 1200})
-    '1,201 predictions lay outside the allowed range and were truncated: 1 to 0.05 s, 1,200 to 20 s.'
+    '1,201 predictions lay outside the allowed range and were truncated: 1 at 0.05 s and 1,200 at 20 s.'
     """
     moved = {boundary: n for boundary, n in truncated.items() if n}
     n_moved = sum(moved.values())
     if not moved:
         return "Nothing was truncated."
-    where = ", ".join(f"{grouped(n)} to {boundary.replace('-', '−')} s" for boundary, n in moved.items())
+    parts = [f"{grouped(n)} at {boundary.replace('-', '−')} s" for boundary, n in moved.items()]
     subject = "1 prediction" if n_moved == 1 else f"{grouped(n_moved)} predictions"
     verb = "was" if n_moved == 1 else "were"
-    return f"{subject} lay outside the allowed range and {verb} truncated: {where}."
+    return f"{subject} lay outside the allowed range and {verb} truncated: {get_text_list(parts, 'and')}."

@@ -57,12 +57,15 @@ def test_rank_is_the_boards_with_its_range(signed_in: Client, inferred: list[Sub
     assert f"Rank{row.rank} of {n_ranked}95% range ({within})" in card(look(signed_in, inferred[1]))
 
 
-def test_maintainer_reads_the_same_rank_of_a_private_one(
+def test_maintainer_reads_the_same_rank_of_a_private_one_and_nobody_quotes_it(
     keeper: Client, edition: Edition, owner: User
 ) -> None:
     sent = builders.submit(owner, builders.predictions(edition, factor=1.01), visibility="PRIVATE")
     builders.score_all()
-    assert "Rank if public1 of" in card(look(keeper, sent))
+    root = look(keeper, sent)
+    assert "Rank if public1 of" in card(root)
+    assert ", rank" not in root.one("code", id="citation").text
+    assert root.one("code", id="latex-row").text.startswith("-- &")
 
 
 @pytest.mark.parametrize("visibility", ["PUBLIC", "PRIVATE"])
@@ -103,7 +106,7 @@ def test_it_stands_beside_the_teams_best_other_and_the_nearest_published_row(
     nearest = min(printed, key=lambda row: abs((row.scores["mid"] or 0) - mid(inferred[1])))
     root = look(signed_in, inferred[1])
     own, published = beside(root)
-    assert own[0].startswith("M1.05, your team’s best other method, 20")
+    assert own[0].startswith("M1.05, your team’s best other submission, 20")
     gap = round(mid(inferred[1]) - mid(inferred[0]), 1)
     assert gap > 0
     assert own[1:3] == [f"{mid(inferred[0]):.1f}", f"+{gap:.1f}"]
@@ -161,7 +164,9 @@ def test_score_is_quoted_in_one_line_and_no_interval_breaks(
 ) -> None:
     root = look(signed_in, inferred[1])
     quoted = root.one("code", id="citation").text
-    assert re.fullmatch(r"MiD ([0-9.]+) \[[0-9.]+, [0-9.]+\], rank \d( \(\d–\d\))?, test, edition 1", quoted)
+    assert re.fullmatch(
+        r"MiD ([0-9.]+) \[[0-9.]+, [0-9.]+\] ×10⁻⁴, rank \d( \(\d–\d\))?, Test, edition 1", quoted
+    )
     cells = root.one("div", class_="result").all("td", class_="span")
     assert all(
         re.fullmatch(r"[0-9.]+–[0-9.]+", cell.all("span")[0].text) for cell in cells if cell.text != "–"
@@ -173,7 +178,7 @@ def test_score_is_quoted_in_one_line_and_no_interval_breaks(
 
 
 @pytest.mark.parametrize(
-    ("limit", "left"), [(20, ". 19 more files may be rejected within 24 hours."), (None, ".")]
+    ("limit", "left"), [(20, ". You may have 19 more files rejected in the next 24 hours."), (None, ".")]
 )
 def test_rejected_file_uses_no_quota_and_page_says_how_many_more_are_taken(
     signed_in: Client, edition: Edition, owner: User, limit: int | None, left: str
@@ -182,7 +187,7 @@ def test_rejected_file_uses_no_quota_and_page_says_how_many_more_are_taken(
     sent = builders.submit(owner, b"[]")
     builders.score_all()
     assert (
-        f"Rejected: not scored. This didn’t count against your quota{left} Correct"
+        f"This file was not scored and did not count against your quota{left} Correct"
         in look(signed_in, sent).one("main").text
     )
 

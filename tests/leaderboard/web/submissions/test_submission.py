@@ -142,7 +142,10 @@ def test_result_has_the_papers_columns_the_counts_and_the_truncations(
         assert values == [scores[f"mid-{name}"], scores[f"rte-{name}"]]
     assert rows[0].one("td", class_="count").text == str(builders.N_SEQUENCES)
     assert "truncated" in root.one("main").text
-    assert "1 sequence outside all TTC ranges counts only in the overall scores" in root.one("main").text
+    assert (
+        "1 sequence lies outside all TTC ranges and counts only towards the overall scores"
+        in root.one("main").text
+    )
 
 
 def test_problems_are_numbered_with_position_and_total(

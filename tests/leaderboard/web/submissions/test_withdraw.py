@@ -106,7 +106,7 @@ def test_team_sees_when_its_file_is_not_scored_in_the_new_edition(
 def test_page_says_what_withdrawing_does_and_that_it_stays_done(signed_in: Client, sent: Submission) -> None:
     (link,) = [a for a in pages.page(signed_in.get(address(sent))).all("a") if a.text.startswith("Withdraw")]
     root = assert_sound(signed_in.get(link.attributes["href"]))
-    assert "This cannot be undone." in root.one("main").text
+    assert "I know that this cannot be undone." in root.one("main").text
     assert "removed from the current board and from all earlier editions" in root.one("main").text
     assert root.one("main").one("button").text == "Withdraw"
     sent.refresh_from_db()
