@@ -77,7 +77,7 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     tab_to(page, "Publish…")
     press("Enter")
     page.wait_for_url("**/visibility/")
-    tab_to(page, "anonymous")
+    tab_to(page, "Anonymously")
     press("ArrowDown")
     tab_to(page, "Preview")
     press("Enter")

@@ -77,7 +77,7 @@ class ShowForm(SiteForm):
         label="Becomes public on",
         required=False,
         error_messages={"invalid": "Enter a date such as 2027-03-01."},
-        help_text="Optional, for anonymous methods: the day (UTC) on which the method becomes public.",
+        help_text="Optional, a day in UTC.",
         widget=forms.DateInput(attrs={"type": "date"}),
     )
     # The preview is a form, too, and asks for no tick.

@@ -49,7 +49,6 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
         "results": [
             method_result(result, of_result) for result, of_result in zip(achieved, pairs, strict=True)
         ],
-        "sent_to": sent_to,
         "table": submission_table(last),
         "board_split": achieved[0].split.pk if achieved else sent_to.pk if sent_to else "",
         **export_views.of_method(achieved),

@@ -74,14 +74,14 @@ def test_each_split_stands_in_its_own_section(
     assert "Simulated" not in sections[0].text
 
 
-def test_method_without_a_score_leads_to_the_board_that_its_file_was_sent_to(
+def test_method_without_a_score_leads_to_its_submissions(
     signed_in: Client, edition: Edition, owner: User, tmp_path: Path
 ) -> None:
     builders.import_truth(tmp_path, split="val", seed=1)
     sent = builders.send(owner, b"{}", split="val", method="Nothing scored").submission
     root = pages.page(signed_in.get(f"/methods/{sent.method_id}/"))
     trail = root.one("p", class_="trail").one("a")
-    assert (trail.text, trail.attributes["href"]) == ("Validation", "/board/val/")
+    assert (trail.text, trail.attributes["href"]) == ("My submissions", "/submissions/")
     assert root.one("nav", class_="site-nav").all("a")[0].attributes["href"] == "/board/val/"
 
 
@@ -91,7 +91,7 @@ def test_private_method_is_marked_for_its_team(
     Method.objects.update(visibility=Visibility.PRIVATE)
     for member in (owner, teammate):
         client.force_login(member)
-        assert "only your team sees this page" in get(client, method).one("main").text
+        assert "only your team and the maintainers see this page" in get(client, method).one("main").text
 
 
 def test_details_are_chips_and_a_row_of_the_board_shows_the_first_of_them(
@@ -158,9 +158,11 @@ def test_own_method_offers_the_next_submission_and_lists_the_rejected_ones(
     sent = builders.submit(owner, b"[]", method="Night & day", visibility="PRIVATE")
     builders.score_all()
     main = pages.get(signed_in, f"/methods/{sent.method_id}/").one("main")
-    (button,) = [a for a in main.all("a") if a.text == "Submit again"]
+    links = {a.text: a for a in main.one("p", class_="actions").all("a")}
+    assert list(links) == ["Submit again", "Edit details", "Its submissions", "Delete…"], "nothing to publish"
     assert [row.all("td")[3].text for row in main.one("tbody").all("tr")] == [
         "rejectedThe outermost value is a list"
     ]
-    form = pages.get(signed_in, html.unescape(button.attributes["href"])).one("form", id="submit")
+    address = html.unescape(links["Submit again"].attributes["href"])
+    form = pages.get(signed_in, address).one("form", id="submit")
     assert form.one("input", name="method").attributes["value"] == "Night & day"
