@@ -72,7 +72,7 @@ def reference_curves(*, split: Split, besides: Method) -> list[tuple[str, Entry,
     ranked.sort(key=lambda entry: entry.rank or 0)
     baseline = settings.BENCHMARK.baseline
     named = [entry for entry in ranked[1:] if baseline and entry.method.startswith(baseline)]
-    chosen = {"Best row": ranked[:1], "Baseline": named[:1]}
+    chosen = {"Best on the board": ranked[:1], "Baseline": named[:1]}
     ids = [entry.evaluation_id for rows in chosen.values() for entry in rows if entry.evaluation_id]
     known = curves(edition=board.edition, evaluations=ids)
     return [

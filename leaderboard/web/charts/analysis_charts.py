@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from evaluator.counting import counted
-from evaluator.metrics.registry import WARNING_S, Metric
+from evaluator.metrics.registry import WARNING, WARNING_S, Metric
 from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import Entry
 from leaderboard.models import Analysis
@@ -46,7 +46,9 @@ def error_analysis_tables(closer: Analysis, references: Sequence[Reference]) -> 
     content, distribution = closer.content, closer.content["distribution"]
     rules = closer.evaluation.edition.rules
     errors = [metric for metric in rules.metrics if metric.name in distribution]
-    quantiles = zip(*(distribution[metric.name] for metric in errors), strict=True)
+    # Quantiles of an error that is either 0 or 100 say nothing.
+    graded = [metric for metric in errors if metric is not WARNING]
+    quantiles = zip(*(distribution[metric.name] for metric in graded), strict=True)
     return {
         "n_sequences": counted(content["n_sequences"], "sequence"),
         "n_recordings": counted(content["n_recordings"], "recording"),
@@ -54,6 +56,7 @@ def error_analysis_tables(closer: Analysis, references: Sequence[Reference]) -> 
         "histogram": histogram(content["histogram"], rules.primary),
         "primary": rules.primary.symbol,
         "errors": errors,
+        "graded": graded,
         "quantiles": [
             (f"{100 * row[0]['quantile']:.0f}%", [format_rounded(each["value"]) for each in row])
             for row in quantiles
@@ -62,7 +65,12 @@ def error_analysis_tables(closer: Analysis, references: Sequence[Reference]) -> 
         "warnings": warnings(content.get("warnings", ())),
         "threshold": f"{WARNING_S:g} s",
         "at_threshold": [
-            (name, *_side_words(row[side]), condition)
+            (
+                name,
+                _with_interval(row[side]["share"], row[side]["interval"], unit="%"),
+                grouped(row[side]["n"]),
+                condition,
+            )
             for row in content.get("warnings", ())
             if row["threshold_s"] == WARNING_S
             for name, side, condition in _SIDES
@@ -191,10 +199,10 @@ def _value_words(row: Row, metric: Metric) -> str:
     return _with_interval(row[metric.name], _interval(row, metric))
 
 
-def _with_interval(value: float | None, interval: Sequence[float] | None) -> str:
+def _with_interval(value: float | None, interval: Sequence[float] | None, *, unit: str = "") -> str:
     if interval is None:
-        return format_rounded(value)
-    return f"{format_rounded(value)} ({format_rounded(interval[0])} to {format_rounded(interval[1])})"
+        return f"{format_rounded(value)}{unit}"
+    return f"{format_rounded(value)}{unit} ({format_rounded(interval[0])} to {format_rounded(interval[1])})"
 
 
 # --- who is warned ---------------------------------------------------------------------------------------

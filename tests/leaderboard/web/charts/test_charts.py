@@ -273,7 +273,7 @@ def test_team_looks_closer_at_what_it_sent_to_an_open_split(
         "scatter",
     ]
     assert all(figure.one("tbody").all("tr") for figure in root.all("figure"))
-    assert "Best row" not in root.one("main").text, "there is no other row"
+    assert "Best on the board" not in root.one("main").text, "there is no other row"
     worst = [float(row.all("td")[1].text) for row in root.all("table")[-1].one("tbody").all("tr")]
     assert worst == sorted(worst, reverse=True)
     assert address in client.get(f"/submissions/{open_split.pk}/").content.decode()
@@ -305,7 +305,7 @@ def test_errors_by_time_stand_beside_those_of_the_best_public_row_and_of_the_bas
     cells = [row.all("td")[-4].text for row in figure.one("tbody").all("tr")]
     assert cells == [f"{row['mid']:.2f}" for row in best]
     series = options_of(figure)["series"]
-    grey = [each for each in series if each["name"] == "Best row: Best"]
+    grey = [each for each in series if each["name"] == "Best on the board: Best"]
     dashed = {each["name"] for each in series if each.get("lineStyle", {}).get("type") == "dashed"}
     assert dashed == {"Baseline (dashed): Pixel MSE, ours"}
     assert [y for each in grey if each["yAxisIndex"] == 0 for _, y in each["data"]] == [
@@ -336,8 +336,11 @@ def test_three_metrics_have_three_panels_and_a_chart_of_who_is_warned(
     rows = [[cell.text for cell in row.all("td")] for row in figures["warnings"].one("tbody").all("tr")]
     assert [row[0] for row in rows] == ["1", "1.5", "2", "2.5", "2.7", "3", "3.5", "4", "4.5", "5"]
     missed, false_alarms = (each.text for each in analysis.one("dl").all("dd"))
-    assert missed == f"{rows[4][2]}% of {rows[4][1]} sequences with 0 < τ ≤ 2.7 s"
-    assert false_alarms == f"{rows[4][4]}% of {rows[4][3]} sequences with τ ≤ 0 or τ > 2.7 s"
+    shares = [
+        f"{value}% {interval}".strip() for value, _, interval in (rows[4][j].partition(" ") for j in (2, 4))
+    ]
+    assert missed == f"{shares[0]} of the {rows[4][1]} sequences with 0 < τ ≤ 2.7 s"
+    assert false_alarms == f"{shares[1]} of the {rows[4][3]} sequences with τ ≤ 0 or τ > 2.7 s"
 
 
 def test_of_a_large_board_the_front_and_the_lowest_are_drawn_and_the_chart_says_so(
