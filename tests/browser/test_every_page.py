@@ -175,6 +175,7 @@ def test_contact_lens_moves_by_keyboard_and_its_numbers_with_it(page: Page, know
     page.goto(PAIR.format(**known))
     slider, time, numbers = (page.locator(f"#lens{part}") for part in ("-slider", "-time", " dd span"))
     vehicle = page.locator("#lens-vehicle")
+    slider.press("End")
     expect(time).to_have_text("20.0 s")
     far, errors = vehicle.get_attribute("transform") or "", numbers.all_inner_texts()
     for _ in range(3):  # beyond the middle of the last range errors stay

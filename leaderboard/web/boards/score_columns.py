@@ -6,6 +6,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import Final
 
+from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
 from evaluator.metrics.protocol import (
@@ -76,21 +77,19 @@ class Cell:
 
     @property
     def drawn(self) -> SafeString:
-        """Return the table cell; a large board has a thousand, for which a template takes far longer.
-
-        Its parts are numbers and words of this module: there is nothing to escape.
-        """
-        text, spoken = self.text, ""
+        """Return the table cell; a large board has a thousand, for which a template takes far longer."""
+        text: str = self.text
+        spoken: str = NOTHING
         if self.is_best or self.is_second:
             tag, mark = ("strong", "best") if self.is_best else ("u", "second")
-            text = f'<{tag}>{text}</{tag}><span class="spoken"> {mark}</span>'
+            text = format_html('<{0}>{1}</{0}><span class="spoken"> {2}</span>', tag, text, mark)
         if self.is_with_best:
-            spoken += f'<span class="spoken">, {MARKED}</span>'
+            spoken += format_html('<span class="spoken">, {}</span>', MARKED)
         if self.interval and not self.whisker:
-            spoken += f'<span class="spoken">, {self.interval}</span>'
+            spoken += format_html('<span class="spoken">, {}</span>', self.interval)
         css = f"{self.css} {self.range_css}" + " with-best" * self.is_with_best
-        title = f' title="{hint}"' if (hint := self.hint) else ""
-        return SafeString(f'<td class="{css}"{title}>{text}{spoken}</td>')
+        title = format_html(' title="{}"', hint) if (hint := self.hint) else NOTHING
+        return format_html('<td class="{}"{}>{}{}</td>', css, title, text, spoken)
 
     @property
     def ends(self) -> list[str]:

@@ -62,7 +62,8 @@ def named_marks(name: str, front: Sequence[Mark], chosen: Iterable[int], look: L
         "distance": 6,
         "align": "left",
         "formatter": call("name"),
-        "backgroundColor": "--ground",
+        "textBorderColor": "--ground",
+        "textBorderWidth": 3,
     }
     return series | {"data": items, "label": label, "labelLayout": call("below", nexts)}
 

@@ -37,7 +37,7 @@ def test_comparison_is_a_202_until_a_worker_has_computed_it(entries: list[Submis
         assert list(pair["differences"]) == list(SCORE_NAMES)
         mid = pair["differences"]["mid"]
         assert mid["low"] <= mid["difference"] <= mid["high"]
-        assert "MiD is" in pair["sentence"]
+        assert "The MiD of" in pair["sentence"]
         is_undecided = mid["detectable_difference"] is not None
         assert is_undecided == ("with about 80% power" in pair["sentence"]) == (not mid["is_significant"])
         names = {entry["method_id"]: entry["method"] for entry in body["entries"]}

@@ -96,7 +96,7 @@ def test_publishing_makes_it_the_board_with_the_reason(
     assert response.redirect_chain == [("/board/test/", 302)]
     root = assert_sound(response)
     assert "Edition 2 is now the board of test." in root.one("div", class_="messages").text
-    assert "edition 2, 5 labels corrected" in root.one("p", class_="facts").text
+    assert "edition 2 (5 labels corrected)" in root.one("p", class_="facts").text
     publication = Publication.objects.first()
     assert publication is not None
     assert (publication.reason, publication.by) == ("Five labels were wrong.", maintainer)

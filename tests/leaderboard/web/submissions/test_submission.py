@@ -129,7 +129,7 @@ def test_result_has_the_papers_columns_the_counts_and_the_truncations(
     root = get(signed_in, PAGE, submission)
     table = root.one("div", class_="result").one("table")
     heads = [head.text for head in table.one("thead").all("th")]
-    assert heads == ["TTC range", "MiD ×10⁻⁴", "RTE %", "sequences"]
+    assert heads == ["TTC range", "MiD ×10⁻⁴", "RTE %", "Sequences"]
     scores = {
         f"{s.metric}-{s.ttc_range}": f"{s.value:.1f}" for s in submission.evaluations.get().scores.all()
     }
