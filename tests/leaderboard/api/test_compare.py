@@ -43,7 +43,7 @@ def test_comparison_is_a_202_until_a_worker_has_computed_it(entries: list[Submis
         names = {entry["method_id"]: entry["method"] for entry in body["entries"]}
         for name, difference in pair["differences"].items():
             if difference is not None:
-                assert difference["sentence"].startswith(names[pair["first"]]), name
+                assert f" of {names[pair['first']]} is " in difference["sentence"], name
                 assert (" on small" in difference["sentence"]) == name.endswith("_small"), name
         assert pair["differences"]["mid"]["sentence"] == pair["sentence"]
     assert client.get(address(*ids, more="&edition=1")).json() == body

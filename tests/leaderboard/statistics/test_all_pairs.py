@@ -72,7 +72,7 @@ def test_a_class_of_p_counts_as_its_upper_end() -> None:
     three = compared(None, None, None, below=(0.01, 0.01, 1.0))
     assert "it is significantly better than the other two." in compare_tables.verdict(three)
     four = compared(*[None] * 6, entries=(A, B, C, replace(C, method="D")), below=(0.01, 0.01, 0.01, 1, 1, 1))
-    assert "it is not significantly better than B, C and D." in compare_tables.verdict(four)
+    assert "it is not significantly better than the other three." in compare_tables.verdict(four)
 
 
 def test_no_method_is_called_worse_that_the_board_marks_as_possibly_best() -> None:
