@@ -175,16 +175,16 @@ def test_contact_lens_moves_by_keyboard_and_its_numbers_with_it(page: Page, know
     page.goto(PAIR.format(**known))
     slider, time, numbers = (page.locator(f"#lens{part}") for part in ("-slider", "-time", " dd span"))
     vehicle = page.locator("#lens-vehicle")
-    slider.press("End")
+    slider.press("Home")
     expect(time).to_have_text("20.0 s")
     far, errors = vehicle.get_attribute("transform") or "", numbers.all_inner_texts()
     for _ in range(3):  # beyond the middle of the last range errors stay
-        slider.press("PageDown")
+        slider.press("PageUp")
     expect(time).not_to_have_text("20.0 s")
     expect(slider).to_have_attribute("aria-valuetext", time.inner_text().replace(" s", " seconds"))
     expect(vehicle).not_to_have_attribute("transform", far)
     assert not set(errors) & set(numbers.all_inner_texts())
-    slider.press("Home")
+    slider.press("End")
     expect(numbers).to_have_text(["0.00 s, 0.0 m"] * 2)
 
 
