@@ -11,9 +11,12 @@ def counted(n: int, singular: str, plural: str = "") -> str:
 
 
 def file_size(n_bytes: int) -> str:
-    """Word a size in kB, rounded up, so that a file over a limit never reads like one at it.
+    """Word a size in kB or whole MB, rounded up, so that a file over a limit never reads like one at it.
 
-    >>> file_size(812), file_size(81_234), file_size(20_000_001)
-    ('812 bytes', '82 kB', '20,001 kB')
+    >>> file_size(812), file_size(81_234), file_size(20_000_000), file_size(20_000_001)
+    ('812 bytes', '82 kB', '20 MB', '20,001 kB')
     """
-    return counted(n_bytes, "byte") if n_bytes < 1000 else f"{-(-n_bytes // 1000):,} kB"
+    if n_bytes < 1000:
+        return counted(n_bytes, "byte")
+    n_kilobytes = -(-n_bytes // 1000)
+    return f"{n_kilobytes // 1000:,} MB" if n_kilobytes % 1000 == 0 else f"{n_kilobytes:,} kB"

@@ -8,7 +8,11 @@ const button = form.querySelector(".actions button");
 const byId = (id) => document.getElementById(id);
 const maxBytes = Number(form.dataset.maxBytes);
 const grouped = (n) => n.toLocaleString("en-GB");
-const fileSize = (n) => (n < 1000 ? counted(n, "byte") : `${grouped(Math.ceil(n / 1000))} kB`);
+const fileSize = (n) => {
+  const kilobytes = Math.ceil(n / 1000);
+  if (n < 1000) return counted(n, "byte");
+  return kilobytes % 1000 ? `${grouped(kilobytes)} kB` : `${grouped(kilobytes / 1000)} MB`;
+};
 const counted = (n, noun) => `${grouped(n)} ${noun}${n === 1 ? "" : "s"}`;
 
 function element(tag, text = "", css = "") {
@@ -96,12 +100,11 @@ check();
 
 const method = form.querySelector("input[name=method]");
 const notices = byId("notices");
-const allNotices = [...notices.children];
 
 method.addEventListener("input", () => {
   const found = [...document.querySelectorAll("#methods option")].find((option) => option.value === method.value.trim());
   const told = found?.dataset.notice ? [element("p", found.dataset.notice)] : [];
-  notices.replaceChildren(...(method.value.trim() ? told : allNotices));
+  notices.replaceChildren(...told);
 });
 
 // --- a file that is dropped: beside the form a browser would open it, and what was written would be gone ---------

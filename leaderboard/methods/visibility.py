@@ -103,10 +103,10 @@ def require_possible(method: Method, *, visibility: str, reveal_at: datetime | N
 def notice_of(method: Method) -> str:
     """Say who sees the results of a method; empty if private."""
     if method.visibility == Visibility.PUBLIC:
-        return f"{method.name} is public: everyone sees its results on every split."
+        return f"“{method.name}” is public: everyone sees its results on every split."
     if method.visibility == Visibility.ANONYMOUS:
         return (
-            f"{method.name} is anonymous: everyone sees its results on every split, under the name "
+            f"“{method.name}” is anonymous: everyone sees its results on every split, under the name "
             f"{method.pseudonym}."
         )
     return ""

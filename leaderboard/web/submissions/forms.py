@@ -71,7 +71,7 @@ class SubmissionForm(DetailsForm):
 
     note = forms.CharField(
         required=False,
-        help_text="Visible to your team only.",
+        help_text="Only your team sees it.",
         widget=forms.TextInput(attrs={"maxlength": 500, "autocomplete": "off"}),
     )
 

@@ -100,7 +100,7 @@ def test_first_submission_of_a_private_method_says_how_to_show_it(tsttc: Tsttc, 
     assert "private" not in submit(tsttc).output
 
 
-NOTICE = "Foo++ is public: everyone sees its results on every split."
+NOTICE = "“Foo++” is public: everyone sees its results on every split."
 PUBLIC = {"id": "m1", "name": "Foo++", "visibility": "PUBLIC", "notice": NOTICE}
 
 

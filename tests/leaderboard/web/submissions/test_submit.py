@@ -82,8 +82,8 @@ def test_own_teams_methods_are_offered_and_nobody_elses(
     ("visibility", "sentence"),
     [
         ("PRIVATE", ""),
-        ("ANONYMOUS", "Mine is anonymous: everyone sees its results on every split, under the name "),
-        ("PUBLIC", "Mine is public: everyone sees its results on every split."),
+        ("ANONYMOUS", "“Mine” is anonymous: everyone sees its results on every split, under the name "),
+        ("PUBLIC", "“Mine” is public: everyone sees its results on every split."),
     ],
 )
 def test_page_and_api_say_who_will_see_the_result_before_anything_is_sent(
