@@ -130,8 +130,9 @@ def publish(
 ) -> None:
     """Publish METHOD, the name or id of a method of your team. This cannot be undone.
 
-    New methods are private: only your team sees them. An anonymous method shows its scores under
-    a pseudonym and can become public later. The command shows a preview before it asks for confirmation.
+    New methods are private: only your team and the maintainers see them. An anonymous method shows its
+    scores under a pseudonym and can become public later. The command shows a preview before it asks for
+    confirmation.
 
     \b
     Examples:

@@ -139,7 +139,7 @@ def submit(
         if submission.is_new and submission.visibility == "PRIVATE" and not as_json:
             name = printable(submission.method)
             click.echo(
-                f"\n{name} is private: only your team sees its results. "
+                f"\n{name} is private: only your team and the maintainers see its results. "
                 f'Publish it with: tsttc publish "{name}"'
             )
 

@@ -29,7 +29,7 @@ MINE = OpenApiParameter(
     "mine",
     str,
     enum=list(tables.WITH_INTERVALS),
-    description="`0` or `no`: the public board, without the rows that only your team sees.",
+    description="`0` or `no`: the public board, without your team's private rows.",
 )
 FILTERS = [
     OpenApiParameter(name, str, description=f"{each.label}: {each.kind.takes}.")

@@ -131,7 +131,7 @@ def compare(
     """
     board = snapshots.board(split=split, edition=edition, viewer=viewer)
     if board.edition is None:
-        raise NotOnTheBoard(f"The split {split.pk} has no board yet; expected one with ground truth.")
+        raise NotOnTheBoard(f"The split {split.title} has no board yet; expected one with ground truth.")
     # It is at hand, and would be asked for again.
     board.edition.split = board.split
     chosen = _chosen(board, methods, viewer)
@@ -208,7 +208,7 @@ def _chosen(board: listing.Board, methods: Sequence[UUID], viewer: User | Anonym
     for pk in methods:
         if pk not in entry_of:
             if Method.objects.visible_to(viewer).filter(pk=pk).exists():
-                raise NotOnTheBoard(f"The method {pk} has no scored submission on {board.split.pk}.")
+                raise NotOnTheBoard(f"The method {pk} has no scored submission on {board.split.title}.")
             raise UnknownMethod(f"There is no method {pk} that you may see; expected one of the board.")
     return [entry_of[pk] for pk in methods]
 

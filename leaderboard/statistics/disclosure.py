@@ -114,13 +114,13 @@ def why_withheld(first: Entry, second: Entry, *, edition: Edition) -> str:
         if entry.visibility != Visibility.PUBLIC:
             return (
                 f"No confidence interval and no p-value: {entry.method} is not public, and the ground "
-                f"truth of {edition.split_id} is hidden. {_POSSIBLE}"
+                f"truth of {edition.split.title} is hidden. {_POSSIBLE}"
             )
     # Teams that show a method have different names, by a constraint of the database.
     if first.team == second.team:
         return (
             "No confidence interval and no p-value: both methods are of one team, and the ground truth of "
-            f"{edition.split_id} is hidden. {_POSSIBLE}"
+            f"{edition.split.title} is hidden. {_POSSIBLE}"
         )
     return ""
 
@@ -133,7 +133,7 @@ def why_withheld_by_mark(first: Submission, second: Submission, *, edition: Edit
     if methods[0].team_id != methods[1].team_id and all(m.visibility == Visibility.PUBLIC for m in methods):
         return ""
     return (
-        f"No confidence interval and no p-value: the ground truth of {edition.split_id} was imported as "
+        f"No confidence interval and no p-value: the ground truth of {edition.split.title} was imported as "
         f"hidden. {_POSSIBLE}"
     )
 

@@ -128,7 +128,7 @@ def test_what_is_one_s_own_is_listed_taken_back_and_withdrawn(job: Job) -> None:
 def test_worse_method_fails_the_gate_and_the_better_one_is_shown(job: Job) -> None:
     good = job.submit(job.predictions(1.05), "--wait", method="Steady")
     assert good.returncode == 0, good.stderr
-    assert "Steady is private: only your team sees its results." in good.stdout
+    assert "Steady is private: only your team and the maintainers see its results." in good.stdout
     gate = ("--fail-if-worse-than", "Steady")
     worse = job.submit(job.predictions(1.06), *gate, "--json", method="Shaky")
     assert worse.returncode == 6, worse.stderr

@@ -145,21 +145,25 @@ def _is_key(model: type[Model], text: str) -> bool:
 
 
 def _submission(row: Submission) -> Subject:
-    return Subject(f"{row.method.name} on {row.split_id}", reverse("submission", args=[row.pk]))
+    return Subject(f"{row.method.name} on {row.split.title}", reverse("submission", args=[row.pk]))
 
 
 _TABLES: Final[Mapping[str, tuple[Any, tuple[str, ...], Callable[[Any], Subject]]]] = {
     "Edition": (
         Edition,
-        (),
+        ("split",),
         lambda row: Subject(
-            f"{row.number} of {row.split_id}", reverse("maintain_edition", args=[row.split_id, row.number])
+            f"{row.number} of {row.split.title}", reverse("maintain_edition", args=[row.split_id, row.number])
         ),
     ),
-    "Evaluation": (Evaluation, ("submission__method",), lambda row: _submission(row.submission)),
+    "Evaluation": (
+        Evaluation,
+        ("submission__method", "submission__split"),
+        lambda row: _submission(row.submission),
+    ),
     "Method": (Method, (), lambda row: Subject(row.name, reverse("method", args=[row.pk]))),
     "Split": (Split, (), lambda row: Subject(row.title, reverse("maintain_split", args=[row.pk]))),
-    "Submission": (Submission, ("method",), _submission),
+    "Submission": (Submission, ("method", "split"), _submission),
     "Team": (Team, (), lambda row: Subject(row.name, reverse("maintain_team", args=[row.pk]))),
     "User": (User, (), lambda row: Subject(row.email)),
 }

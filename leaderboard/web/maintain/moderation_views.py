@@ -265,5 +265,5 @@ def _team_of(subject: Team | Method | Submission | User) -> Team | None:
 
 def _name_of(subject: Team | Method | Submission | User) -> str:
     if isinstance(subject, Submission):
-        return f"{subject.method.name} on {subject.split_id}, {subject.submitted_at:%Y-%m-%d %H:%M} UTC"
+        return f"{subject.method.name} on {subject.split.title}, {subject.submitted_at:%Y-%m-%d %H:%M} UTC"
     return subject.email if isinstance(subject, User) else subject.name

@@ -137,7 +137,7 @@ class NewSplitForm(PolicyForm):
         self.fields["truth"].choices = [  # type: ignore[attr-defined]  # a ChoiceField
             ("hidden", "its own, hidden"),
             ("open", "its own, open"),
-            *((f"as {split.pk}", f"that of {split.pk}, shared: a challenge") for split in able),
+            *((f"as {split.pk}", f"that of {split.title}, shared: a challenge") for split in able),
         ]
 
     def wanted(self) -> dict[str, Any]:

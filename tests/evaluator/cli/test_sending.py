@@ -95,7 +95,8 @@ def test_first_submission_of_a_private_method_says_how_to_show_it(tsttc: Tsttc, 
     private = QUEUED | {"method": "Foo\x1b[2J++", "visibility": "PRIVATE"}
     site.put(POST, Reply(private, status=201), Reply(private | {"visibility": "PUBLIC"}, status=201))
     assert submit(tsttc).stdout.endswith(
-        'is private: only your team sees its results. Publish it with: tsttc publish "Foo\\x1b[2J++"\n'
+        "is private: only your team and the maintainers see its results. "
+        'Publish it with: tsttc publish "Foo\\x1b[2J++"\n'
     )
     assert "private" not in submit(tsttc).output
 

@@ -153,10 +153,10 @@ def test_what_makes_no_comparison_is_refused_in_words(entries: list[Submission],
         ask(*many, *many[:2])
     with pytest.raises(BadComparison, match=r"given twice"):
         ask(entries[0], entries[0])
-    with pytest.raises(NotOnTheBoard, match=r"val has no board"):
+    with pytest.raises(NotOnTheBoard, match=r"Validation has no board"):
         ask(*many, split="val")
     intake.withdraw(submission=entries[0], actor=owner, now=timezone.now())
-    with pytest.raises(NotOnTheBoard, match=r"no scored submission on test"):
+    with pytest.raises(NotOnTheBoard, match=r"no scored submission on Test"):
         ask(*many)
     codes = {kind.code for kind in (BadComparison, UnknownMethod, NotOnTheBoard)}
     assert codes == {"bad-comparison", "unknown-method", "not-on-the-board"}

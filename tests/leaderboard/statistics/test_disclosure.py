@@ -148,7 +148,7 @@ def test_two_methods_of_one_team_are_not_compared_on_a_hidden_split(
         plain(answer.pairs[0])
         assert answer.pairs[0].withheld == (
             "No confidence interval and no p-value: both methods are of one team, and the ground truth of "
-            "test is hidden. There, only public methods of different teams are compared; compare these two "
+            "Test is hidden. There, only public methods of different teams are compared; compare these two "
             "on a split with open ground truth, or their files offline with tsttc compare."
         )
 
@@ -217,7 +217,7 @@ def test_calling_a_hidden_split_open_in_the_database_tells_no_more_of_it(
         for delta in known(pair).values():
             assert (delta.low, delta.high, delta.p, delta.p_below) == (None, None, None, None)
         assert pair.withheld == (
-            "No confidence interval and no p-value: the ground truth of test was imported as hidden. There, "
+            "No confidence interval and no p-value: the ground truth of Test was imported as hidden. There, "
             "only public methods of different teams are compared; compare these two on a split with open "
             "ground truth, or their files offline with tsttc compare."
         )
