@@ -103,7 +103,7 @@ def _check_keys(members: Members, manifest: Manifest, findings: Findings, pointe
     unknown = [name for name in names if name not in by_id and name not in by_natural_key]
     if unknown:
         message = (
-            f"{_n(len(unknown), 'key names', 'keys name')} no sequence of the manifest: "
+            f"{_n(len(unknown), 'key is', 'keys are')} not in the manifest: "
             f"{listed([quoted(name) for name in unknown])}; expected its anno_ids, as plain decimal numbers, "
             "or its natural keys bag_stamp/cam_id/ts/track_id."
         )

@@ -241,13 +241,13 @@ CASES: dict[str, tuple[Any, ...]] = {
     "unknown key": (
         flat({**GOOD, "4": 1.0}),
         "unknown-keys",
-        f'1 key names no sequence of the manifest: "4"; {EXPECTED_KEYS}',
+        f'1 key is not in the manifest: "4"; {EXPECTED_KEYS}',
         "/4",
     ),
     "hostile unknown keys": (
         b'{"0": 1, "1": 1, "2": 1, "3": 1, "\\u0000\\ud800": 1, "' + b"x" * 1000 + b'": 1, "": 1}',
         "unknown-keys",
-        f'3 keys name no sequence of the manifest: "\\u0000\\ud800", "{"x" * 60}…", ""; {EXPECTED_KEYS}',
+        f'3 keys are not in the manifest: "\\u0000\\ud800", "{"x" * 60}…", ""; {EXPECTED_KEYS}',
         "/\\u0000\\ud800",
     ),
     "doubled key": (

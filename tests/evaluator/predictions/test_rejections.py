@@ -57,7 +57,7 @@ def test_many_missing_and_unknown_keys_are_counted_and_twenty_are_named() -> Non
     unknown, missing = rejection(flat({f"x{row}": 1.0 for row in range(30)}), manifest=manifest).problems
     assert "x19" in unknown.message
     assert "x20" not in unknown.message
-    assert unknown.message.startswith("30 keys name no sequence of the manifest: ")
+    assert unknown.message.startswith("30 keys are not in the manifest: ")
     assert missing.message.startswith("100 sequences have no value: 0, 1, 2, ")
     assert "18, 19, … (the first 20); expected" in missing.message
 
