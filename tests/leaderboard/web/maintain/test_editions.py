@@ -22,7 +22,7 @@ from leaderboard.models import (
 )
 from tests import builders, pages
 from tests.editions import extended, open_edition, publish
-from tests.leaderboard.web.maintain.desk import FIRST, HUB, OPEN, SECOND, get, effects, main_text
+from tests.leaderboard.web.maintain.desk import FIRST, HUB, OPEN, SECOND, effects, get, main_text
 
 pytestmark = pytest.mark.slow
 
@@ -54,16 +54,18 @@ def test_every_page_is_sound(keeper: Client, rescored: Edition, address: str) ->
 
 def test_desk_shows_each_split_with_its_board_and_what_is_prepared(keeper: Client, second: Edition) -> None:
     root = get(keeper, HUB)
-    assert [h2.text for h2 in root.all("h2")] == ["Test", "Validation", "Demo"]
+    assert [h2.text for h2 in root.all("h2")] == ["Waiting for you", "Pages", "Editions"]
     # Django's administration shows nothing to a maintainer who is no superuser.
     assert "administration" in root.one("main").text
     User.objects.update(is_superuser=False)
     assert "administration" not in main_text(keeper, HUB)
-    test, val, _ = (section.text for section in root.all("section", class_="desk"))
-    assert "edition 1 published" in test
-    assert "Edition 2 draft since" in test
-    assert "0 %. 0 of 4 submissions finished." in test
-    assert "python manage.py import_truth val PATH" in val
+    test, val, _ = (row.text for row in root.one("table").one("tbody").all("tr"))
+    assert "edition 1, published" in test
+    draft = root.all("div", class_="preparing")[0].text
+    assert draft.startswith("Test, edition 2 draft since")
+    assert "0 %. 0 of 4 submissions finished." in draft
+    assert "none: no ground truth yet" in val
+    assert "python manage.py import_truth val PATH" in main_text(keeper, "/maintain/val/open/")
     bar = root.one("progress")
     assert (bar.attributes["value"], bar.attributes["max"]) == ("0", "4")
 
@@ -147,11 +149,11 @@ def test_the_current_edition_shows_its_contents_who_published_it_and_its_changes
     assert "Ground truth: 5 labels corrected." in effects(root)
     assert rescored.ground_truth.digest in root.text
     assert re.search(r"UTC (from the command line|by \S+@\S+): “", root.text)
-    assert "What changed from edition 1" in root.text
+    assert "What this edition changed compared with edition 1" in root.text
     assert "Publish again" not in root.text
     assert preview.preview(rescored).replaces == 1
     former = main_text(keeper, FIRST)
-    assert "What would change from edition 2" in former
+    assert "What publishing it again would change compared with edition 2" in former
     assert "Publish again…" in former
 
 
@@ -186,8 +188,7 @@ def test_a_protocol_that_lacks_a_metric_says_who_loses_it(
     builders.score_all()
     root = get(keeper, SECOND)
     assert effects(root) == [
-        "The protocol toolkit replaces tsttc-2. "
-        "It has no warning error (WE): all 2 entries lose this score.",
+        "The protocol toolkit replaces tsttc-2. It has no warning error (WE): all 2 entries lose this score.",
         "MiD, RTE, all ranks and the ground truth stay the same.",
     ]
     assert effects(get(keeper, f"{SECOND}publish/"))[:2] == effects(root)

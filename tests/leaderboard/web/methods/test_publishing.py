@@ -151,7 +151,7 @@ def test_giving_up_ends_a_preparation_and_its_work(keeper: Client, second: Editi
     assert "4 queued evaluations are cancelled" in main_text(keeper, f"{SECOND}discard/")
     response = keeper.post(f"{SECOND}discard/", {"reason": "The wrong file."}, follow=True)
     assert response.redirect_chain == [(HUB, 302)]
-    assert "No draft edition." in assert_sound(response).one("main").text
+    assert "Compare and decide" not in assert_sound(response).one("main").text
     event = AuditEvent.objects.filter(verb="discarded").get()
     assert (event.actor, event.details["reason"]) == (maintainer, "The wrong file.")
     assert builders.score_all() == 0
