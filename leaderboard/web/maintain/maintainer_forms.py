@@ -58,7 +58,8 @@ class OpenForm(SiteForm):
 
 class ReasonForm(SiteForm):
     reason = reason_field(
-        "One or two sentences, for the public changelog and the audit log.", at="public changelog"
+        "One or two sentences. The public changelog and the notice to the teams show them.",
+        at="public changelog",
     )
 
 
