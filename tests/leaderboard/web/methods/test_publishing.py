@@ -83,9 +83,9 @@ def test_publishing_repeats_the_consequences_and_carries_what_was_compared(
     root = get(keeper, f"{SECOND}publish/")
     assert root.one("input", name="replaces").attributes["value"] == "1"
     assert root.all("input", type="checkbox") == []
-    told = effects(get(keeper, SECOND))
-    assert effects(root)[: len(told)] == told
-    assert told[0] == "Ground truth: 5 labels corrected."
+    sentences = effects(get(keeper, SECOND))
+    assert effects(root)[: len(sentences)] == sentences
+    assert sentences[0] == "Ground truth: 5 labels corrected."
     assert "Edition 2 replaces edition 1 on the Test board." in root.one("main").text
 
 
