@@ -126,9 +126,10 @@ def compare(
 ) -> Compared:
     """Compare two to five methods on the published board or a named edition.
 
-    `best_first` orders three or more by the score that ranks. Queues pairs that are not computed; they have `differences` None. Pairs that `disclosure.why_withheld`
-    names have only the difference of the published values. Raises `BadComparison`, `UnknownMethod`,
-    `NotOnTheBoard`, and `comparison_queue.TooManyComparisons` by account or `address`.
+    `best_first` orders three or more by the score that ranks. Queues pairs that are not computed; they have
+    `differences` None. Pairs that `disclosure.why_withheld` names have only the difference of the published
+    values. Raises `BadComparison`, `UnknownMethod`, `NotOnTheBoard`, and
+    `comparison_queue.TooManyComparisons` by account or `address`.
     """
     board = snapshots.board(split=split, edition=edition, viewer=viewer)
     if board.edition is None:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Final
 
@@ -100,7 +100,9 @@ def page(text: str) -> Document:
     for token in _inline(tokens):
         if "href" in token.attrs and not _TARGET.match(str(token.attrs["href"])):
             token.attrSet("href", "#")
-    return _document(tokens, parser)
+    document = _document(tokens, parser)
+    # On a phone each row is a block.
+    return replace(document, html=SafeString(document.html.replace('class="list"', 'class="list cards"')))
 
 
 @cache

@@ -116,13 +116,38 @@ def _values(table: PublishedTable, metric: Metric) -> list[float]:
 DOWNLOADS: Final = tuple(each for each in FORMATS if each.name in {"csv", "latex", "markdown"})
 
 
+_WHY: Final = " Why: "
+"""In a note, between what is so and its derivation, which the page folds."""
+
+
+def _groups(tables: Sequence[PrintedTable]) -> dict[str, list[PrintedTable]]:
+    """Group the tables for the index: what was measured, what was varied, and what the data is."""
+    groups: dict[str, list[PrintedTable]] = {"Results": [], "Ablations": [], "Dataset": []}
+    for each in tables:
+        kind = "Ablations" if each.table.parameter else "Results"
+        groups[kind if each.table.is_result else "Dataset"].append(each)
+    return groups
+
+
 @gzip_page
 @require_safe
 def published_page(request: HttpRequest) -> HttpResponse:
     if not settings.BENCHMARK.has_paper_tables:
         raise Http404("This benchmark has no tables of a paper.")
-    shown = [{"shown": each, "chart": sweep(each)} for each in published.printed_tables()]
-    context = {"tables": shown, "source": published_tables().source, "downloads": DOWNLOADS}
+    printed = published.printed_tables()
+    context = {
+        "tables": [
+            {
+                "shown": each,
+                "chart": sweep(each),
+                "notes": [note.partition(_WHY)[::2] for note in each.table.notes],
+            }
+            for each in printed
+        ],
+        "groups": _groups(printed),
+        "source": published_tables().source,
+        "downloads": DOWNLOADS,
+    }
     return render(request, "charts/published.html", context)
 
 

@@ -50,8 +50,6 @@ def score_card(entry: Entry, rows: Sequence[Entry], *, n_ranked: int, gap: Gap |
     others = [row for row in rows if row.method_id != entry.method_id]
     values = [row.value for row in others if row.value is not None]
     metric = metric_of(entry.primary)
-    by_value = sorted((row for row in (entry, *others) if row.value is not None), key=lambda row: row.value or 0)
-    lowest, *_, highest = [format_rounded(row.value, decimals=row.decimals) for row in (by_value[0], *by_value)]
     n_better = sum(value < entry.value for value in values)
     words = f"{metric.symbol} of all methods: {n_better} lower, {len(values) - n_better} not."
     return ScoreCard(
@@ -64,7 +62,15 @@ def score_card(entry: Entry, rows: Sequence[Entry], *, n_ranked: int, gap: Gap |
         gap=gap,
         strip=whiskers.strip(values, own=entry.value) if len(values) > 1 else NOTHING,
         strip_words=words,
-        ends=(lowest, highest),
+        ends=_ends([entry, *(row for row in others if row.value is not None)]),
+    )
+
+
+def _ends(rows: Sequence[Entry]) -> tuple[str, str]:
+    lowest, highest = (choose(rows, key=lambda row: row.value or 0.0) for choose in (min, max))
+    return (
+        format_rounded(lowest.value, decimals=lowest.decimals),
+        format_rounded(highest.value, decimals=highest.decimals),
     )
 
 

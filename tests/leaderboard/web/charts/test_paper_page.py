@@ -31,7 +31,7 @@ def test_the_page_has_every_value_and_marks_the_defaults(client: Client) -> None
     assert answer.text.count("(default)</span>") == sum(
         row.is_default for table in published_tables().tables for row in table.rows
     )
-    assert "15.5 fits" in answer.text
+    assert "15.5 is probably right" in answer.text
 
 
 def test_sweeps_have_a_chart_with_every_number_of_their_table() -> None:
