@@ -15,7 +15,7 @@ from evaluator.metrics.registry import Metric
 from evaluator.papers.tables import PublishedRow, PublishedTable, published_tables
 from evaluator.tables import published
 from evaluator.tables.formats import FORMATS
-from evaluator.tables.published import PrintedTable, method_name, setting_text
+from evaluator.tables.published import PrintedRow, PrintedTable, method_name, setting_text
 from leaderboard.web.charts.chart_options import (
     Chart,
     Frame,
@@ -129,6 +129,27 @@ def _groups(tables: Sequence[PrintedTable]) -> dict[str, list[PrintedTable]]:
     return groups
 
 
+def _with_best(shown: PrintedTable) -> list[tuple[PrintedRow, frozenset[int]]]:
+    """Return the rows, each with the places of the values that are lowest in their split, of main results."""
+    if not shown.table.is_result or shown.table.parameter:
+        return [(row, frozenset()) for row in shown.rows]
+    lowest: dict[tuple[str, int], float] = {}
+    for row in shown.rows:
+        for i, text in enumerate(row.cells[shown.n_names :], start=shown.n_names):
+            lowest[row.cells[0], i] = min(float(text), lowest.get((row.cells[0], i), float("inf")))
+    return [
+        (
+            row,
+            frozenset(
+                i
+                for (split, i), low in lowest.items()
+                if split == row.cells[0] and float(row.cells[i]) == low
+            ),
+        )
+        for row in shown.rows
+    ]
+
+
 @gzip_page
 @require_safe
 def published_page(request: HttpRequest) -> HttpResponse:
@@ -140,6 +161,7 @@ def published_page(request: HttpRequest) -> HttpResponse:
             {
                 "shown": each,
                 "chart": sweep(each),
+                "rows": _with_best(each),
                 "notes": [note.partition(_WHY)[::2] for note in each.table.notes],
             }
             for each in printed
