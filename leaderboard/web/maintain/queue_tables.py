@@ -69,6 +69,7 @@ def queue_table(*, state: str = "", split: str = "", number: Any = 1) -> dict[st
         "sections": sections,
         "faults": faults,
         "has_worker": has_worker,
+        "max_age_s": f"{health.MAX_SWEEP_AGE_S:.0f}",
         "finished_at": finished_at,
         "seen": hashlib.sha256(repr(shown).encode()).hexdigest()[:16],
     }
@@ -121,7 +122,7 @@ def strike_words(evaluation: Evaluation) -> str:
 
 def _faults(*, has_worker: bool) -> Iterable[str]:
     if not has_worker:
-        yield f"There was no sweep in the last {health.MAX_SWEEP_AGE_S:.0f} s: every worker is gone."
+        yield f"No worker was seen in the last {health.MAX_SWEEP_AGE_S:.0f} s: nothing is evaluated."
     n_out_of_reach = health.n_out_of_reach()
     if n_out_of_reach:
         yield (

@@ -63,9 +63,7 @@ def rows(root: pages.Element, heading: str) -> list[list[str]]:
     """Return the rows of one list as texts; none where it is not shown."""
     shown = [each for each in root.all("section") if each.one("h2").text.startswith(heading)]
     assert len(shown) < 2
-    return [
-        [cell.text for cell in row.all("td")] for each in shown for row in each.one("tbody").all("tr")
-    ]
+    return [[cell.text for cell in row.all("td")] for each in shown for row in each.one("tbody").all("tr")]
 
 
 def retry(client: Client, *evaluations: Evaluation | UUID, query: str = "") -> HttpResponseBase:
@@ -92,7 +90,7 @@ def test_empty_queue_is_one_line_and_a_chosen_list_has_its_own(keeper: Client, e
 def test_page_says_when_the_last_evaluation_finished_and_whether_a_worker_lives(
     keeper: Client, edition: Edition, owner: User
 ) -> None:
-    seen_lately = "A worker was seen in the last 60 seconds."
+    seen_lately = "A worker was seen in the last 60 s."
     assert seen_lately not in main_text(keeper, QUEUE)
     builders.submit(owner, builders.predictions(edition))
     builders.score_all()
@@ -155,7 +153,7 @@ def test_rows_say_what_makes_them_matter_less(keeper: Client, failed: Evaluation
 
 
 def test_page_says_that_nobody_looks_after_the_queue(keeper: Client, edition: Edition) -> None:
-    gone = "There was no sweep in the last 60 s: every worker is gone."
+    gone = "No worker was seen in the last 60 s: nothing is evaluated."
     assert gone in main_text(keeper, QUEUE)
     health.record_sweep(n_out_of_reach=2)
     text = main_text(keeper, QUEUE)
