@@ -46,7 +46,7 @@ class RowForm(SiteForm):
     url = _text("Link to the paper", placeholder="https://")
     table = _text("Where the numbers are", placeholder="Table 2")
     code = _text("Link to the code (optional)", is_required=False, placeholder="https://")
-    scores = forms.CharField(widget=forms.Textarea(attrs={"spellcheck": "false"}))
+    scores = forms.CharField(widget=forms.Textarea(attrs={"spellcheck": "false", "class": "digest"}))
     is_replacing = _replacing()
 
     def __init__(self, *args: Any, **options: Any) -> None:
@@ -124,7 +124,7 @@ class PaperForm(SiteForm):
         required=False,
         strip=False,
         help_text="With source, columns, methods and results. Paste it here, or choose a file below.",
-        widget=forms.Textarea(attrs={"rows": 8, "spellcheck": "false"}),
+        widget=forms.Textarea(attrs={"rows": 8, "spellcheck": "false", "class": "digest"}),
     )
     file = forms.FileField(
         label="File",
