@@ -31,8 +31,8 @@ def _text(label: str, *, is_required: bool = True, **attrs: str) -> forms.CharFi
     )
 
 
-def _replacing() -> forms.BooleanField:
-    return forms.BooleanField(label="Replace the existing row of this method", required=False)
+def _replacing(rows: str) -> forms.BooleanField:
+    return forms.BooleanField(label=f"Replace {rows}", required=False)
 
 
 class RowForm(SiteForm):
@@ -47,7 +47,7 @@ class RowForm(SiteForm):
     table = _text("Where the numbers are", placeholder="Table 2")
     code = _text("Link to the code (optional)", is_required=False, placeholder="https://")
     scores = forms.CharField(widget=forms.Textarea(attrs={"spellcheck": "false", "class": "digest"}))
-    is_replacing = _replacing()
+    is_replacing = _replacing("the existing row of this method")
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -132,7 +132,7 @@ class PaperForm(SiteForm):
         widget=forms.FileInput(attrs={"accept": ".json,application/json"}),
         error_messages={"empty": "The document is empty; expected JSON."},
     )
-    is_replacing = _replacing()
+    is_replacing = _replacing("the existing rows of these methods")
 
     def refuse(self, refusal: Exception) -> None:
         """Show every problem of the document at its field."""

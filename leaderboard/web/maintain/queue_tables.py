@@ -80,7 +80,9 @@ def _listed(state: State, *, split: str) -> QuerySet[Evaluation]:
     rows = Evaluation.objects.filter(status=state.status)
     rows = rows.order_by(*state.order) if state.order else rows.in_turn()
     rows = rows.filter(submission__split=split) if split else rows
-    people = rows.select_related("submission__method__team", "submission__submitted_by", "edition")
+    people = rows.select_related(
+        "submission__method__team", "submission__split", "submission__submitted_by", "edition"
+    )
     return people.defer("report", "problems")
 
 

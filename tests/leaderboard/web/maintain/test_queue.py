@@ -105,7 +105,7 @@ def test_what_failed_says_why_when_and_after_how_many_tries(keeper: Client, fail
     [row] = rows(get(keeper, QUEUE), "System errors")
     assert failed.finished_at is not None
     assert row[0] == f"{failed.finished_at:%Y-%m-%d %H:%M} UTC"
-    expected = ["Foo private", "Owls", "owner@example.org", "test", "1", "live", "3", "file 3 of 3", REASON]
+    expected = ["Foo private", "Owls", "owner@example.org", "Test", "1", "live", "3", "file 3 of 3", REASON]
     assert row[1:10] == expected
 
 
