@@ -24,7 +24,7 @@ _KEEP_SMALL: Final = (
 
 
 class Section(NamedTuple):
-    """Fields below a heading, those of a short value beside each other."""
+    """Fields below a heading; those with short values share a row."""
 
     title: str
     wide: Sequence[str]
@@ -107,7 +107,7 @@ class PolicyForm(QuotaRulesForm):
         "them;” and then this text. Example: write to board@example.org.",
     )
 
-    layout = (
+    layout: tuple[tuple[Section, ...], ...] = (
         (Section("Split", ("title", "description"), _DISPLAY_FIELDS), _DATES),
         (_ANNOUNCEMENT, Section("Quota", (), _QUOTA_FIELDS), _ADMISSION),
     )
