@@ -6,6 +6,7 @@ from datetime import datetime
 from typing import Final
 
 from django.db import transaction
+from django.db.models import QuerySet
 
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
@@ -40,10 +41,14 @@ def cleaned(*, split: Split, subject: str, text: str) -> Announcement:
     return Announcement(split, subject, text)
 
 
+def readers(split: Split) -> QuerySet[User]:
+    """Return users who want announcements and whose team sent a file to the split."""
+    return notices.readers(MailKind.ANNOUNCEMENT).filter(notices.has_sent_to(split))
+
+
 def recipients(announcement: Announcement) -> list[User]:
-    """Return users who want announcements, whose team sent a file, and who have not got this one."""
-    people = notices.readers(MailKind.ANNOUNCEMENT).filter(notices.has_sent_to(announcement.split))
-    keys = {user: announcement.key(user.pk) for user in people}
+    """Return the readers of its split who have not got this one."""
+    keys = {user: announcement.key(user.pk) for user in readers(announcement.split)}
     sent_keys = set(Mail.objects.filter(key__in=keys.values()).values_list("key", flat=True))
     return [user for user, key in keys.items() if key not in sent_keys]
 

@@ -59,6 +59,12 @@ def sweep_age_s(*, using: str = "default") -> float | None:
     return None if age is None else age.total_seconds()
 
 
+def has_recent_sweep() -> bool:
+    """Say whether a worker swept within `MAX_SWEEP_AGE_S`."""
+    age_s = sweep_age_s()
+    return age_s is not None and age_s <= MAX_SWEEP_AGE_S
+
+
 def checks() -> tuple[Check, ...]:
     """Check database, sweep and broker, within about three times `CHECK_TIMEOUT_S`."""
     return (*_database(), broker())

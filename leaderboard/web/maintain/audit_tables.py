@@ -89,7 +89,13 @@ def named(event: AuditEvent, names: Mapping[str, str]) -> dict[str, str]:
 def _details(
     event: AuditEvent, names: Mapping[str, str], subjects: Mapping[tuple[str, str], Subject]
 ) -> list[tuple[str, str]]:
-    texts = {name: _words(value) for name, value in event.details.items()}
+    # A first attempt is the rule, and a digest is for programs: the JSON has both.
+    shown = {
+        name: value
+        for name, value in event.details.items()
+        if name != "report_digest" and (name, value) != ("attempt", 1)
+    }
+    texts = {name: _words(value) for name, value in shown.items()}
     texts |= {
         name: subjects[noun, text].name
         for name, text in texts.items()

@@ -32,6 +32,10 @@ def _day(label: str) -> forms.DateField:
     )
 
 
+def _narrow() -> forms.TextInput:
+    return forms.TextInput(attrs={"size": 14})
+
+
 def _occurring(name: str, words_of: Callable[[str], str]) -> list[tuple[str, str]]:
     words = AuditEvent.objects.order_by(name).values_list(name, flat=True).distinct()
     return [("", "any"), *((word, words_of(word)) for word in words)]
@@ -40,14 +44,14 @@ def _occurring(name: str, words_of: Callable[[str], str]) -> list[tuple[str, str
 class AuditFilter(SiteForm):
     """Actor, verb, noun, and days in UTC, both included."""
 
-    actor = forms.CharField(label="Actor (part of the email address)", required=False, max_length=254)
+    actor = forms.CharField(label="Actor’s email contains", required=False, max_length=254, widget=_narrow())
     verb = forms.ChoiceField(
         label="Action", required=False, choices=partial(_occurring, "verb", audit_tables.verb_words)
     )
     noun = forms.ChoiceField(
         label="Object type", required=False, choices=partial(_occurring, "noun", audit_tables.noun_words)
     )
-    noun_id = forms.CharField(label="Object ID (prefix)", required=False, max_length=80)
+    noun_id = forms.CharField(label="Object ID starts with", required=False, max_length=80, widget=_narrow())
     since = _day("From")
     until = _day("To")
 

@@ -24,9 +24,9 @@ from leaderboard.web.maintain.maintainer_views import (
 class PageForm(SiteForm):
     text = forms.CharField(
         strip=False,
-        help_text="Markdown: ## headings, lists, tables, **bold**, [links](https://…). HTML is shown as text "
-        f"and images are left out. At most {MAX_TEXT:,} characters.",
-        widget=forms.Textarea(attrs={"rows": 24}),
+        help_text="Markdown: ## headings, lists, tables, **bold**, [links](https://…). HTML tags and images "
+        f"do not work. At most {MAX_TEXT:,} characters.",
+        widget=forms.Textarea(attrs={"rows": 24, "class": "digest"}),
         error_messages={"required": "The text is empty; expected at least a sentence."},
     )
     replaces = forms.IntegerField(

@@ -219,6 +219,7 @@ def team(request: HttpRequest, team_id: UUID) -> HttpResponse:
         "team": row,
         "members": row.memberships.select_related("user").order_by("joined_at"),
         "methods": Method.objects.existing().filter(team=row).order_by("name"),
+        "n_sent": sent.count(),
         "sent": _with_states(sent.order_by("-submitted_at")[:MAX_ENTRIES]),
     }
     return render(request, "maintain/team.html", context)
@@ -227,9 +228,9 @@ def team(request: HttpRequest, team_id: UUID) -> HttpResponse:
 def _with_states(sent: Iterable[Submission]) -> list[Submission]:
     rows = list(sent)
     decided = Evaluation.objects.filter(submission__in=rows, edition=F("submission__split__current_edition"))
-    states = {row.submission_id: row.get_status_display() for row in decided}
+    evaluations = {row.submission_id: row for row in decided}
     for row in rows:
-        row.state = states.get(row.pk, "")  # type: ignore[attr-defined]  # for the template
+        row.evaluation = evaluations.get(row.pk)  # type: ignore[attr-defined]  # for the template
     return rows
 
 

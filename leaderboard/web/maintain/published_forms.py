@@ -23,19 +23,16 @@ _FIELDS: Final = {
 _NOT_PRINTED: Final = frozenset({"-", "–", "—", "null"})
 
 
-def _text(label: str, help_text: str = "", *, is_required: bool = True, **attrs: str) -> forms.CharField:
+def _text(label: str, *, is_required: bool = True, **attrs: str) -> forms.CharField:
     return forms.CharField(
         label=label,
         required=is_required,
-        help_text=help_text,
         widget=forms.TextInput(attrs={"autocomplete": "off", **attrs}),
     )
 
 
-def _replacing() -> forms.BooleanField:
-    return forms.BooleanField(
-        label="Replace", required=False, help_text="Takes the place of the row of the same method."
-    )
+def _replacing(rows: str) -> forms.BooleanField:
+    return forms.BooleanField(label=f"Replace {rows}", required=False)
 
 
 class RowForm(SiteForm):
@@ -44,20 +41,24 @@ class RowForm(SiteForm):
     split = forms.ChoiceField(choices=lambda: [(row.pk, row.title) for row in Split.objects.all()])
     name = _text("Method", maxlength="80")
     title = _text("Title of the paper")
-    authors = _text("Authors", "As in the paper, separated by commas.")
+    authors = _text("Authors, separated by commas")
     year = forms.IntegerField(widget=forms.NumberInput(attrs={"inputmode": "numeric"}))
-    url = _text("Paper", placeholder="https://")
-    table = _text("Table", "Where the numbers stand, such as Table 2.")
-    code = _text("Code", is_required=False, placeholder="https://")
-    scores = forms.CharField(
-        widget=forms.Textarea(attrs={"rows": 2, "placeholder": "14.0 27.0 15.1 11.2 – …"})
-    )
-    is_replacing = _replacing()
+    url = _text("Link to the paper", placeholder="https://")
+    table = _text("Where the numbers are", placeholder="Table 2")
+    code = _text("Link to the code (optional)", is_required=False, placeholder="https://")
+    scores = forms.CharField(widget=forms.Textarea(attrs={"spellcheck": "false", "class": "digest"}))
+    is_replacing = _replacing("the existing row of this method")
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        names = ", ".join(_protocol_of(_first_split()).score_names)
-        self.fields["scores"].help_text = f"Separated by spaces, a dash where the paper prints none: {names}."
+        protocol = _protocol_of(_first_split())
+        n_lines, n_each = len(protocol.metrics), len(protocol.range_names)
+        self.fields["scores"].help_text = (
+            f"{n_lines * n_each} numbers, separated by spaces: {n_lines} lines, one for each of "
+            f"{', '.join(metric.symbol for metric in protocol.metrics)}, with {n_each} numbers in each line: "
+            f"{', '.join(protocol.range_names)}. Write – where the paper gives no number."
+        )
+        self.fields["scores"].widget.attrs["rows"] = n_lines
 
     def document(self) -> dict[str, Any]:
         """Return the document of this row. Raises `BadDocument` for a score that is no number."""
@@ -119,11 +120,11 @@ def _score(text: str) -> float | None:
 
 class PaperForm(SiteForm):
     text = forms.CharField(
-        label="Document",
+        label="JSON document",
         required=False,
         strip=False,
-        help_text="JSON with source, columns, methods and results: paste it here, or choose a file.",
-        widget=forms.Textarea(attrs={"rows": 8, "spellcheck": "false"}),
+        help_text="With source, columns, methods and results. Paste it here, or choose a file below.",
+        widget=forms.Textarea(attrs={"rows": 8, "spellcheck": "false", "class": "digest"}),
     )
     file = forms.FileField(
         label="File",
@@ -131,7 +132,7 @@ class PaperForm(SiteForm):
         widget=forms.FileInput(attrs={"accept": ".json,application/json"}),
         error_messages={"empty": "The document is empty; expected JSON."},
     )
-    is_replacing = _replacing()
+    is_replacing = _replacing("the existing rows of these methods")
 
     def refuse(self, refusal: Exception) -> None:
         """Show every problem of the document at its field."""

@@ -45,7 +45,8 @@ def published(request: HttpRequest) -> HttpResponse:
         "row_form": row_form,
         "document_form": form,
         "example": example(),
-        "rows": [(row, _overall_words(row)) for row in splits.quoted()],
+        "papers": _by_paper(),
+        "opened": request.GET.get("form", ""),
     }
     form = row_form if is_row else form
     if form.is_valid():
@@ -60,6 +61,15 @@ def published(request: HttpRequest) -> HttpResponse:
             messages.success(request, f"Rows: {', '.join(words) or 'none'}.")
             return redirect("maintain_published")
     return form_page(request, "maintain/published.html", form, **context)
+
+
+def _by_paper() -> list[list[tuple[PublishedResult, str]]]:
+    """Return the rows on the boards with their overall scores, by split and paper."""
+    papers: dict[tuple[str, ...], list[tuple[PublishedResult, str]]] = {}
+    for row in splits.quoted():
+        paper = (row.split_id, row.source_url, row.source_title, row.source_table)
+        papers.setdefault(paper, []).append((row, _overall_words(row)))
+    return list(papers.values())
 
 
 def _overall_words(row: PublishedResult) -> str:

@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Any, Final, NamedTuple
 
 from django.core.paginator import Paginator
-from django.db.models import Count, Min, QuerySet
+from django.db.models import Count, Max, Min, QuerySet
 
 from leaderboard.db import clock
 from leaderboard.models import Evaluation, Status, Visibility
@@ -50,9 +50,11 @@ def queue_table(*, state: str = "", split: str = "", number: Any = 1) -> dict[st
 
     `seen` changes when a row or a count does.
     """
-    summary, faults, now = totals(split=split), list(_faults()), clock.database_now()
+    has_worker = health.has_recent_sweep()
+    summary, faults, now = totals(split=split), list(_faults(has_worker=has_worker)), clock.database_now()
+    finished_at = _last_finished_at(split=split)
     sections: list[dict[str, Any]] = []
-    shown: list[object] = [summary, faults]
+    shown: list[object] = [summary, faults, finished_at]
     for name in [state] if state else STATES:
         paginator = Paginator(_listed(STATES[name], split=split), PER_PAGE if state else PER_SECTION)
         # Counted already, for all lists at once.
@@ -66,6 +68,9 @@ def queue_table(*, state: str = "", split: str = "", number: Any = 1) -> dict[st
         "headings": [(name, each.heading, summary["counts"][name]) for name, each in STATES.items()],
         "sections": sections,
         "faults": faults,
+        "has_worker": has_worker,
+        "max_age_s": f"{health.MAX_SWEEP_AGE_S:.0f}",
+        "finished_at": finished_at,
         "seen": hashlib.sha256(repr(shown).encode()).hexdigest()[:16],
     }
 
@@ -75,8 +80,17 @@ def _listed(state: State, *, split: str) -> QuerySet[Evaluation]:
     rows = Evaluation.objects.filter(status=state.status)
     rows = rows.order_by(*state.order) if state.order else rows.in_turn()
     rows = rows.filter(submission__split=split) if split else rows
-    people = rows.select_related("submission__method__team", "submission__submitted_by", "edition")
+    people = rows.select_related(
+        "submission__method__team", "submission__split", "submission__submitted_by", "edition"
+    )
     return people.defer("report", "problems")
+
+
+def _last_finished_at(*, split: str) -> datetime | None:
+    decided = Evaluation.objects.filter(status__in=[Status.SCORED, Status.REJECTED])
+    decided = decided.filter(submission__split=split) if split else decided
+    last: datetime | None = decided.aggregate(last=Max("finished_at"))["last"]
+    return last
 
 
 def _until(evaluation: Evaluation, *, now: datetime) -> datetime | None:
@@ -108,10 +122,9 @@ def strike_words(evaluation: Evaluation) -> str:
     return ", ".join(f"{kind} {n} of {most}" for kind, n, most in strikes if n)
 
 
-def _faults() -> Iterable[str]:
-    age_s = health.sweep_age_s()
-    if age_s is None or age_s > health.MAX_SWEEP_AGE_S:
-        yield f"There was no sweep in the last {health.MAX_SWEEP_AGE_S:.0f} s: every worker is gone."
+def _faults(*, has_worker: bool) -> Iterable[str]:
+    if not has_worker:
+        yield f"No worker was seen in the last {health.MAX_SWEEP_AGE_S:.0f} s: nothing is evaluated."
     n_out_of_reach = health.n_out_of_reach()
     if n_out_of_reach:
         yield (

@@ -18,7 +18,7 @@ from leaderboard.web.maintain.queue_tables import STATES, queue_table
 
 
 def _splits() -> list[tuple[str, str]]:
-    return [("", "all"), *((name, name) for name in Split.objects.values_list("pk", flat=True))]
+    return [("", "all"), *Split.objects.values_list("pk", "title")]
 
 
 class QueueFilter(SiteForm):

@@ -50,20 +50,24 @@ def _count_field(name: str, label: str, help_text: str) -> forms.IntegerField:
 
 class QuotaRulesForm(SiteForm):
     quota_limit = _count_field(
-        "quota_limit", "Submissions", "Of a team, within the window. Empty: no limit; 0: none."
+        "quota_limit",
+        "Submissions",
+        "Of one team in the window. Leave empty for no limit; 0 allows none.",
     )
     quota_window = SpanField(
         label="Window",
-        help_text="Length of the rolling window, for example 30 days or 24 hours.",
+        help_text="The time in which they count, for example 30 days or 24 hours.",
         error_messages={"required": "No window was given; expected one like 30 days or 24 hours."},
     )
     quota_min_gap = SpanField(
-        label="Min. interval",
+        label="Time between submissions",
         required=False,
-        help_text="Minimum time between two submissions of a team. Empty: none.",
+        help_text="Shortest time between two submissions of a team. Leave empty for none.",
     )
     quota_rejected_limit = _count_field(
-        "quota_rejected_limit", "Rejected or cancelled files", "Within 24 hours. Empty: no limit."
+        "quota_rejected_limit",
+        "Rejected or cancelled files",
+        "Of one team in 24 hours. Leave empty for no limit.",
     )
 
 

@@ -11,14 +11,24 @@ from leaderboard.web.formatting import grouped
 
 
 def rules_of(row: QuotaRules) -> dict[str, str]:
-    """Word the rules of a split or team, one by one and in a sentence."""
+    """Word the rules of a split or team, one by one."""
     return {
-        "limit": _most(row.quota_limit),
-        "window": span(row.quota_window),
-        "min_gap": span(row.quota_min_gap) if row.quota_min_gap else "–",
+        "submissions": submissions_of(row),
         "rejected_limit": _most(row.quota_rejected_limit),
-        "sentence": sentence_of(row),
     }
+
+
+def submissions_of(row: QuotaRules) -> str:
+    """Word how many submissions a team has, and how far apart.
+
+    >>> from datetime import timedelta
+    >>> from leaderboard.models import Split
+    >>> submissions_of(Split(quota_limit=3, quota_window=timedelta(30), quota_min_gap=timedelta(1)))
+    '3 in 30 days, 24 hours apart'
+    """
+    limit = row.quota_limit
+    most = "no limit" if limit is None else f"{grouped(limit)} in {span(row.quota_window)}"
+    return f"{most}, {span(row.quota_min_gap)} apart" if row.quota_min_gap else most
 
 
 def sentence_of(row: QuotaRules) -> str:

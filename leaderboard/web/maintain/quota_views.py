@@ -27,7 +27,7 @@ PER_PAGE = 50
 @maintainers_only
 @require_safe
 def quota_rules(request: HttpRequest) -> HttpResponse:
-    overrides = QuotaOverride.objects.select_related("team", "set_by")
+    overrides = QuotaOverride.objects.select_related("team", "split", "set_by")
     overrides = overrides.order_by("split__position", "split", "team__name")
     page = Paginator(overrides, PER_PAGE).get_page(request.GET.get("page"))
     context = {

@@ -1,8 +1,9 @@
 """Forms of splits and of the site's announcement."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import datetime
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from django import forms
 
@@ -15,18 +16,27 @@ from leaderboard.quotas.spans import span
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.quota_forms import QuotaRulesForm
 
-_LISTINGS: Final = [
-    (Listing.LISTED, "listed"),
-    (Listing.ARCHIVED, "archived: the board stays, submissions are closed"),
-    (Listing.OFF, "switched off: on no page, in no form, in no list of the API"),
-]
-# What is not named here comes first, without a heading.
-_SECTIONS: Final = (
-    ("Dates", ("opens_at", "closes_at")),
-    ("Announcement", ("announcement", "announcement_ends_at")),
-    ("Quota", ("quota_limit", "quota_window", "quota_min_gap", "quota_rejected_limit")),
-    ("Admission", ("needs_admission", "how_to_be_admitted")),
+_ZONE: Final = "Add the time zone: UTC, AoE, Europe/Berlin or +01:00."
+_KEEP_SMALL: Final = (
+    "Every extra split on the same hidden ground truth gives teams more tries at the same hidden values. "
+    "Keep the quota small."
 )
+
+
+class Section(NamedTuple):
+    """Fields below a heading; those with short values share a row."""
+
+    title: str
+    wide: Sequence[str]
+    short: Sequence[str] = ()
+    note: str = ""
+
+
+_DATES: Final = Section("Dates", (), ("opens_at", "closes_at"), _ZONE)
+_ANNOUNCEMENT: Final = Section("Announcement", ("announcement", "announcement_ends_at"))
+_QUOTA_FIELDS: Final = ("quota_limit", "quota_window", "quota_min_gap", "quota_rejected_limit")
+_ADMISSION: Final = Section("Admission", ("needs_admission", "how_to_be_admitted"))
+_DISPLAY_FIELDS: Final = ("listing", "position", "decimals")
 
 
 class MomentField(forms.CharField):
@@ -36,7 +46,7 @@ class MomentField(forms.CharField):
             label=label,
             required=False,
             max_length=60,
-            help_text=f"{help_text} With a zone: UTC, AoE, Europe/Berlin or +01:00.",
+            help_text=help_text,
             widget=forms.TextInput(attrs=attrs),
         )
 
@@ -60,27 +70,31 @@ class PolicyForm(QuotaRulesForm):
         help_text="One or two sentences, plain text.",
         widget=forms.Textarea(attrs={"rows": 3}),
     )
-    listing = forms.ChoiceField(choices=_LISTINGS)
+    listing = forms.ChoiceField(
+        choices=Listing.choices,
+        help_text="Archived: the board stays, submissions are closed. Switched off: shown nowhere.",
+    )
     position = forms.IntegerField(
         min_value=0,
         max_value=MAX_POSITION,
         initial=0,
         error_messages=dict.fromkeys(("min_value", "max_value"), POSITION_FAULT),
-        help_text="Splits are listed by this number.",
+        help_text="Splits are sorted by this number, smallest first.",
         widget=forms.NumberInput(attrs={"inputmode": "numeric"}),
     )
-    opens_at = MomentField("Opens", "Empty: as soon as it has ground truth.")
-    closes_at = MomentField("Closes", "Empty: never.")
+    opens_at = MomentField("Opens", "Leave empty to open as soon as there is ground truth.")
+    closes_at = MomentField("Closes", "Leave empty if it never closes.")
     announcement = forms.CharField(
+        label="Text",
         required=False,
         max_length=300,
-        help_text="One line of plain text on the pages of the split and in the API. Empty: none.",
+        help_text="One line of plain text on the pages of the split and in the API. Leave empty for none.",
     )
-    announcement_ends_at = MomentField("Announcement ends", "Needed for an announcement.")
+    announcement_ends_at = MomentField("Ends", f"Required if there is a text. {_ZONE}")
     decimals = forms.TypedChoiceField(
         choices=[(1, "one"), (2, "two")],
         coerce=int,
-        help_text="Decimals of its next edition. Each decimal reveals more of hidden values.",
+        help_text="Of the scores in the next edition. More decimals reveal more of a hidden ground truth.",
     )
     needs_admission = forms.BooleanField(
         label="Restricted", required=False, help_text="Only admitted teams can submit."
@@ -89,16 +103,24 @@ class PolicyForm(QuotaRulesForm):
         label="How to request access",
         required=False,
         max_length=300,
-        help_text="Ends the sentence that teams read, such as: write to board@example.org.",
+        help_text="Teams without access read: “Only admitted teams can submit, and your team is not one of "
+        "them;” and then this text. Example: write to board@example.org.",
     )
 
-    def sections(self) -> list[tuple[str, list[forms.BoundField]]]:
-        """Return headings with their fields."""
-        below = {name: title for title, names in _SECTIONS for name in names}
-        by_title: dict[str, list[forms.BoundField]] = {"": [], **{title: [] for title, _ in _SECTIONS}}
-        for field in self:
-            by_title[below.get(field.name, "")].append(field)
-        return list(by_title.items())
+    layout: tuple[tuple[Section, ...], ...] = (
+        (Section("Split", ("title", "description"), _DISPLAY_FIELDS), _DATES),
+        (_ANNOUNCEMENT, Section("Quota", (), _QUOTA_FIELDS), _ADMISSION),
+    )
+
+    def columns(self) -> list[list[tuple[Section, list[forms.BoundField], list[forms.BoundField]]]]:
+        """Return two columns of sections with their fields."""
+        return [
+            [
+                (each, [self[name] for name in each.wide], [self[name] for name in each.short])
+                for each in column
+            ]
+            for column in self.layout
+        ]
 
     @staticmethod
     def filled_with(policy: Policy) -> dict[str, Any]:
@@ -126,10 +148,16 @@ class NewSplitForm(PolicyForm):
     )
     truth = forms.ChoiceField(
         label="Ground truth",
+        help_text="With its own ground truth, the split starts switched off: import the ground truth with "
+        "manage.py import_truth, then list the split. With that of another split, it has a board at once.",
         error_messages={"required": "No ground truth was chosen; expected one of those listed."},
     )
 
     field_order = ("name", "title", "truth")
+    layout = (
+        (Section("Required", field_order), Section("Display", ("description",), _DISPLAY_FIELDS), _DATES),
+        (_ANNOUNCEMENT, Section("Quota", (), _QUOTA_FIELDS, _KEEP_SMALL), _ADMISSION),
+    )
 
     def __init__(self, data: Any = None, *, initial: Any = None) -> None:
         super().__init__(data, initial=initial)
@@ -137,7 +165,7 @@ class NewSplitForm(PolicyForm):
         self.fields["truth"].choices = [  # type: ignore[attr-defined]  # a ChoiceField
             ("hidden", "its own, hidden"),
             ("open", "its own, open"),
-            *((f"as {split.pk}", f"that of {split.title}, shared: a challenge") for split in able),
+            *((f"as {split.pk}", f"that of {split.title}, a challenge") for split in able),
         ]
 
     def wanted(self) -> dict[str, Any]:
@@ -158,6 +186,6 @@ class AnnouncementForm(SiteForm):
     announcement = forms.CharField(
         required=False,
         max_length=300,
-        help_text="One line of plain text, such as: Maintenance on 3 March, 8:00 to 9:00 UTC. Empty: none.",
+        help_text="One line of plain text, for example: Maintenance on 3 March, 8:00 to 9:00 UTC.",
     )
-    announcement_ends_at = MomentField("Ends", "Needed for an announcement.")
+    announcement_ends_at = MomentField("Ends", f"Required if there is an announcement. {_ZONE}")

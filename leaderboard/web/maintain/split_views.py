@@ -31,13 +31,13 @@ def splits(request: HttpRequest) -> HttpResponse:
     rows = [
         (
             split,
-            (admissions.sentence_of(split, now=now) or "Open.")
+            (admissions.sentence_of(split, now=now) or "yes")
             if split.has_ground_truth
-            else "No ground truth yet.",
+            else "not yet: no ground truth",
             split.announcement_at(now),
-            quota_tables.sentence_of(split),
+            quota_tables.submissions_of(split),
         )
-        for split in Split.objects.select_related("current_edition")
+        for split in Split.objects.select_related("current_edition", "same_truth_as")
     ]
     return render(request, "maintain/splits.html", {"rows": rows})
 
@@ -80,7 +80,8 @@ def announcement(request: HttpRequest) -> HttpResponse:
             policy.announce(text=text, ends_at=ends_at, now=timezone.now(), actor=maintainer_of(request))
             messages.success(request, "The announcement was changed.")
             return redirect("maintain_splits")
-    return form_page(request, "maintain/announcement.html", form)
+    is_shown = current is not None and current.ends_at is not None and current.ends_at > timezone.now()
+    return form_page(request, "maintain/announcement.html", form, current=current if is_shown else None)
 
 
 class MailForm(SiteForm):
@@ -88,14 +89,14 @@ class MailForm(SiteForm):
 
     subject = forms.CharField(
         max_length=announcements.MAX_SUBJECT,
-        help_text="One line. The name of the site stands before it.",
+        help_text="One line. The name of the site is added before it.",
         error_messages={"required": "No subject was given; expected one line."},
         widget=forms.TextInput(attrs={"autocomplete": "off"}),
     )
     text = forms.CharField(
         max_length=announcements.MAX_TEXT,
-        help_text="Plain text, at most 5,000 characters. The mail ends with the name of the site and the "
-        "page where one switches such mails off.",
+        help_text="Plain text, at most 5,000 characters. The name of the site and a link to stop such mails "
+        "are added at the end.",
         error_messages={"required": "No text was given; expected a few sentences."},
         widget=forms.Textarea(attrs={"rows": 10}),
     )
@@ -108,13 +109,18 @@ def mail(request: HttpRequest, split: str) -> HttpResponse:
     step = request.POST.get("step", "")
     if step == "write":
         initial = {name: request.POST.get(name, "") for name in MailForm.base_fields}
-        return form_page(request, "maintain/mail.html", MailForm(initial=initial), split=split_row)
+        return _written(request, MailForm(initial=initial), split_row)
     form = MailForm.asked(request)
     if form.is_valid():
         with form.refusals():
             announcement = announcements.cleaned(split=split_row, **form.cleaned_data)
             return _sent(request, announcement) if step == "send" else _preview(request, announcement)
-    return form_page(request, "maintain/mail.html", form, split=split_row)
+    return _written(request, form, split_row)
+
+
+def _written(request: HttpRequest, form: MailForm, split: Split) -> HttpResponse:
+    n_people = announcements.readers(split).count()
+    return form_page(request, "maintain/mail.html", form, split=split, n_people=n_people)
 
 
 def _preview(request: HttpRequest, announcement: Announcement) -> HttpResponse:

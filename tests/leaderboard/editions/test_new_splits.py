@@ -293,7 +293,7 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
     page, text = "/maintain/announcement/", "Maintenance <b>today</b>, 8:00 UTC."
     visitor = Client()
     assert text not in visitor.get("/board/test/").text
-    assert_sound(keeper.get(page))
+    assert "Nothing is announced now." in assert_sound(keeper.get(page)).one("main").text
     for sent, sentence in (
         ({"announcement": text}, "The announcement has no end; expected an end beside its text."),
         ({"announcement": text, "announcement_ends_at": "2020-01-01 00:00 UTC"}, "is in the past"),
@@ -309,7 +309,9 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
     split_rows = visitor.get("/api/v1/splits").json()
     assert {each["announcement"] for each in split_rows} == {text}
     assert AuditEvent.objects.get(noun="SiteAnnouncement").details["text"] == text
-    assert text in pages.get(keeper, page).one("main").one("input", id="id_announcement").attributes["value"]
+    main = pages.get(keeper, page).one("main")
+    assert text in main.one("input", id="id_announcement").attributes["value"]
+    assert f"Announced until 2099-01-01 00:00 UTC: {text}" in main.text
     change("val", announcement="Val only", announcement_ends_at=timezone.now() + timedelta(hours=1))
     lines = pages.page(visitor.get("/board/val/")).all("p", class_="announcement")
     assert [line.text for line in lines] == [text, "Validation: Val only"]

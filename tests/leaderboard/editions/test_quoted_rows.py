@@ -14,6 +14,7 @@ from leaderboard.editions import papers, splits
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import AuditEvent, Edition, PublishedResult
 from leaderboard.models.benchmark import SINCE_EVER
+from tests import pages
 from tests.editions import board_now, corrected, open_edition, paper, publish, quote, roll_back
 from tests.leaderboard.web.test_every_page import assert_sound
 
@@ -161,7 +162,7 @@ def test_the_page_imports_a_paper_with_missing_values_and_says_where_every_probl
     document["results"]["test"]["later"][3] = None
     assert send(json.dumps(document).encode()).status_code == 302
     page = assert_sound(keeper.get(PAGE)).one("main").text
-    assert "the start of the split" in page
+    assert "always" in page
     assert "Later" in page
     assert "Later" in keeper.get("/board/test/").text
     assert "@misc{ater2026later," in keeper.get("/board/test.bib").text
@@ -205,6 +206,27 @@ ROW = {
     "row-table": "Table 2",
     "row-scores": "14.0 27 15.1 11.2 – 12.0 6.4 – – -",
 }
+
+
+def test_rows_stand_below_their_paper_and_a_form_opens_when_asked_or_refused(
+    keeper: Client, edition: Edition
+) -> None:
+    def opened(page: Any) -> list[str]:
+        details = assert_sound(page).one("main").all("details", class_="note")
+        return [each.attributes["id"] for each in details if "open" in each.attributes]
+
+    assert keeper.post(PAGE, ROW).status_code == 302
+    page = keeper.get(PAGE)
+    table = pages.page(page).one("table")
+    papers = [each.one("th", scope="rowgroup").text for each in table.all("tbody")]
+    assert len(set(papers)) == len(papers)
+    [own] = [each for each in table.all("tbody") if "A paper, Table 2, 2026" in each.text]
+    assert [row.all("td")[0].text for row in own.all("tr")[1:]] == ["Typed net"]
+    assert opened(page) == []
+    assert opened(keeper.get(f"{PAGE}?form=row")) == ["add"]
+    assert opened(keeper.get(f"{PAGE}?form=paper")) == ["import"]
+    assert opened(keeper.post(PAGE, ROW | {"row-year": "1"})) == ["add"]
+    assert opened(keeper.post(PAGE, {"text": "x"})) == ["import"]
 
 
 def test_a_row_is_typed_in_without_a_document(keeper: Client, edition: Edition) -> None:

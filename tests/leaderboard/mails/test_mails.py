@@ -189,7 +189,9 @@ def test_tokens_that_end_and_splits_that_close_bring_mails_to_those_concerned(
 def test_a_maintainer_previews_an_announcement_and_sends_it_once(
     edition: Edition, owner: User, keeper: Client
 ) -> None:
+    assert "Nobody would get this mail now." in keeper.get("/maintain/splits/test/mail/").text
     builders.submit(owner, builders.predictions(edition))
+    assert "This mail goes to 1 person:" in keeper.get("/maintain/splits/test/mail/").text
     address, draft = "/maintain/splits/test/mail/", {"subject": "Moved", "text": "First.\r\n\r\nSecond <b>."}
     assert keeper.post(address, {"subject": "", "text": " "}).status_code == 422
     assert keeper.post(address, draft | {"subject": "x" * 151}).status_code == 422

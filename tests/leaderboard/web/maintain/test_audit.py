@@ -111,9 +111,9 @@ def test_the_page_has_the_beginning_of_a_digest_and_the_export_has_all_of_it(
     keeper: Client, owner: User
 ) -> None:
     digest = f"sha256:{'0123456789abcdef' * 4}"
-    audit.record(verb="v", noun="n", noun_id="1", actor=owner, details={"report_digest": digest})
+    audit.record(verb="v", noun="n", noun_id="1", actor=owner, details={"digest": digest, "attempt": 1})
     [[*_, details, _]] = rows(keeper.get(PAGE))
-    assert details == "report digest: sha256:01234567…"
+    assert details == "digest: sha256:01234567…"
     assert digest in text_of(keeper.get(JSON))
 
 

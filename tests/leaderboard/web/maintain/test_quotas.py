@@ -86,10 +86,10 @@ def wrong(client: Client, where: str, data: dict[str, str]) -> list[str]:
 
 def test_every_split_shows_its_rules(keeper: Client, team: Team) -> None:
     root = get(keeper, QUOTAS)
-    assert [row[:5] for row in cells(root, "Rules")] == [
-        ["Test test", "3", "30 days", "24 hours", "20"],
-        ["Validation val", "50", "24 hours", "–", "20"],
-        ["Demo demo", "20", "24 hours", "–", "20"],
+    assert [row[:3] for row in cells(root, "Rules")] == [
+        ["Test", "3 in 30 days, 24 hours apart", "20"],
+        ["Validation", "50 in 24 hours", "20"],
+        ["Demo", "20 in 24 hours", "20"],
     ]
     assert "No overrides." in root.one("main").text
 
@@ -98,8 +98,8 @@ def test_overrides_say_whose_why_by_whom_and_since_when(keeper: Client, override
     page = keeper.get(QUOTAS)
     [row] = cells(pages.page(page), "Overrides")
     assert row == [
-        *("test", "Owls", "5", "36 hours", "–", "7", "They asked <i>nicely</i>."),
-        *("maintainer@example.org", f"{override.set_at:%Y-%m-%d %H:%M} UTC", "Change", "Delete"),
+        *("Test", "Owls", "5 in 36 hours", "7", "They asked <i>nicely</i>."),
+        *("maintainer@example.org", f"{override.set_at:%Y-%m-%d %H:%M} UTC", "Edit", "Delete"),
     ]
     assert "<i>nicely" not in page.text
 
@@ -121,7 +121,7 @@ def test_team_is_listed_by_name_by_look_and_by_its_people(
     teams.team_of(user=stranger)
     root = pages.page(keeper.get(TEAMS, {"team": text}))
     people = "owner@example.org teammate@example.org"
-    assert cells(root, "Teams") == [["Owls", people, "0", "0", "–", "Quotas"]]
+    assert cells(root, "Teams") == [["Owls", people, "–", "0", "0", "Quotas"]]
     assert address(team) in [a.attributes["href"] for a in root.all("a")]
 
 
@@ -150,12 +150,12 @@ def test_team_shows_what_it_has_left_on_every_split(
     test, val, _ = cells(get(keeper, address(team)), f"Quotas of {team.name}")
     next_at = Submission.objects.get().submitted_at + timedelta(hours=24)
     assert test[:6] == [
-        *("Test", RULES_OF_TEST),
-        *("1", "2", f"{next_at:%Y-%m-%d %H:%M} UTC", "0"),
+        *("Test", "3 in 30 days, 24 hours apart", f"{next_at:%Y-%m-%d %H:%M} UTC"),
+        *("1", "2", "0 of 20"),
     ]
     assert val[:6] == [
-        *("Validation", "50 submissions within 24 hours; 20 rejected or cancelled files within 24 hours"),
-        *("0", "50", "now", "0"),
+        *("Validation", "50 in 24 hours", "now"),
+        *("0", "50", "0 of 20"),
     ]
 
 
