@@ -65,6 +65,15 @@ def test_a_visitor_finds_the_empty_template_in_the_docs_and_a_way_on_from_a_miss
     assert {"/board/test/", "/board/val/"} <= {a.attributes["href"] for a in missing.all("a")}
 
 
+def test_a_guide_links_public_pages_that_it_names_and_shows_the_address_of_the_site(
+    client: Client, benchmark: None
+) -> None:
+    assert pages.get(client, "/docs/cli/").all("a", href="/dist/") != []
+    assert "leaderboard.example.org" not in pages.get(client, "/docs/cli/").text
+    drawn = pages.get(client, "/docs/maintainers/")
+    assert [a for a in drawn.one("article").all("a") if a.attributes["href"].startswith("/maintain/")] == []
+
+
 # --- search ----------------------------------------------------------------------------------------------
 
 
