@@ -53,7 +53,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Security": "security",
         "Reliability": "reliability",
     },
-    "For developers": {"Architecture": "architecture", "Decisions": "decisions"},
+    "For developers": {"Overview": "overview", "Architecture": "architecture", "Decisions": "decisions"},
 }
 _PYTHON: Final = "python"
 """The guide that the reference of the packages follows."""
@@ -103,7 +103,6 @@ def navigation() -> list[tuple[str, list[GuideLink]]]:
     first = [
         GuideLink("At a glance", reverse("docs")),
         GuideLink("Install", reverse("dist")),
-        _entry("Overview", "overview"),
     ]
     return [
         ("", first),
