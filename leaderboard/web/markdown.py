@@ -36,10 +36,11 @@ class TextHeading:
 
 @dataclass(frozen=True)
 class Part:
-    """The plain text below one heading, blocks of code last, for the search."""
+    """The plain text below one heading, code last, for the search; `prose` has no tables and code."""
 
     heading: TextHeading
     text: str
+    prose: str = ""
 
 
 @dataclass(frozen=True)
@@ -129,25 +130,33 @@ def _inline(tokens: Sequence[Token]) -> list[Token]:
 def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
     """Add anchors of headings and classes of tables, and collect the plain text of each part."""
     parts: list[Part] = []
-    heading, texts, code, anchors = TextHeading(0, "", ""), list[str](), list[str](), set[str]()
+    heading, texts, prose, code, anchors = (
+        TextHeading(0, "", ""),
+        list[str](),
+        list[str](),
+        list[str](),
+        set[str](),
+    )
     for at, token in enumerate(tokens):
         if token.type == "heading_open":
-            parts.append(Part(heading, " ".join(filter(None, [*texts, *code]))))
+            parts.append(Part(heading, " ".join(filter(None, [*texts, *code])), " ".join(prose)))
             words = _plain(tokens[at + 1])
-            heading, texts = TextHeading(int(token.tag[1]), words, _anchor(words, anchors)), []
-            code = []
+            heading = TextHeading(int(token.tag[1]), words, _anchor(words, anchors))
+            texts, prose, code = [], [], []
             token.attrSet("id", heading.anchor)
         elif token.type in {"fence", "code_block"}:
             code.append(token.content)
             # Without a language it is an output or a synopsis, which nobody copies.
             token.type, token.info = "fence", token.info or "text"
         elif token.type == "inline" and tokens[at - 1].type != "heading_open":
-            texts.append(_cell(token) if tokens[at - 1].type in {"th_open", "td_open"} else _plain(token))
+            is_cell = tokens[at - 1].type in {"th_open", "td_open"}
+            texts.append(_cell(token) if is_cell else _plain(token))
+            prose += [] if is_cell else texts[-1:]
         elif token.type in {"th_open", "td_open"}:
             _shape(token, tokens[at + 1])
             if not tokens[at + 1].content:
                 token.tag = tokens[at + 2].tag = "td"  # a head without words names nothing
-    parts.append(Part(heading, " ".join(filter(None, [*texts, *code]))))
+    parts.append(Part(heading, " ".join(filter(None, [*texts, *code])), " ".join(prose)))
     html = parser.renderer.render(tokens, parser.options, {})
     html = _CODE.sub(lambda code: _OPTION.sub(r'<span class="together">\g<0></span>', code[0]), html)
     html = html.replace("<table>\n", _TABLE).replace("</table>", "</table>\n</div>")

@@ -102,6 +102,14 @@ def test_what_people_look_for_is_among_the_first_five(
     assert any(href.startswith(address) for href in first), first
 
 
+def test_what_explains_a_word_comes_first_and_longer_words_with_its_beginning_last(
+    client: Client, benchmark: None
+) -> None:
+    hits = search_hits(client, "quota")
+    assert hits[0][0] == "/docs/access/#quotas"
+    assert not [text for _, text in hits[:5] if "quotation" in text]
+
+
 def test_the_words_asked_for_are_marked_and_are_never_markup(client: Client, benchmark: None) -> None:
     assert "<mark>quota</mark>" in client.get("/docs/search/?q=quota").text
     for query in ("<script>alert(1)</script>", '"><img src=x>', "\x00", "%", "(" * 50):
