@@ -32,7 +32,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Command line": "cli",
         "Python": "python",
         "CI": "ci",
-        "API": "api-guide",
+        "API guide": "api-guide",
         "API reference": "",
         "Exports": "exports",
         "Permissions": "access",
