@@ -30,7 +30,7 @@ document.addEventListener("click", async ({ target }) => {
 });
 
 // The documentation has many examples: each gets its button, in room that the stylesheet keeps. Outputs get none.
-for (const example of document.querySelectorAll(".docs pre:has(code:not(.aligned, .language-console, .language-text))")) {
+for (const example of document.querySelectorAll(".docs pre:has(code:not(.language-console, .language-text))")) {
   const button = document.createElement("button");
   button.type = "button";
   button.className = "copy";
@@ -38,6 +38,11 @@ for (const example of document.querySelectorAll(".docs pre:has(code:not(.aligned
   button.innerHTML = 'Copy<span class="spoken"> the example</span>';
   example.append(button);
 }
+// Code that scrolls is reached by the keyboard.
+const reached = new ResizeObserver((entries) => {
+  for (const { target } of entries) target.scrollWidth > target.clientWidth ? (target.tabIndex = 0) : target.removeAttribute("tabindex");
+});
+for (const code of document.querySelectorAll(".docs pre > code")) reached.observe(code);
 
 for (const message of document.querySelectorAll(".messages .message")) {
   const close = document.createElement("button");

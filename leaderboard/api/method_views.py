@@ -204,7 +204,7 @@ class MethodView(APIView):
 
     @extend_schema(operation_id="method", responses={200: MethodSerializer, **errors(404)})
     def get(self, request: Request, method_id: UUID) -> Response:
-        """A method and its details; of another team's anonymous method only what is public."""
+        """A method and its details; for another team's anonymous method, only its public fields."""
         rows = Method.objects.visible_to(request.user).select_related("team")
         return Response(_data(get_object_or_404(rows, pk=method_id), request))
 
@@ -214,7 +214,7 @@ class MethodView(APIView):
         responses={200: MethodSerializer, **errors(404, 422)},
     )
     def patch(self, request: Request, method_id: UUID) -> Response:
-        """Edit a method of your team: fields left out stay as they are, null clears a field."""
+        """Edit a method of your team: omitted fields do not change, null clears a field."""
         method = _own(request, method_id)
         edited = editing.edit(method=method, changes=_fields(request), actor=cast("User", request.user))
         return Response(_data(edited, request))

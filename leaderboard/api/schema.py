@@ -34,6 +34,11 @@ WITH_A_BODY: Mapping[str, tuple[str, str]] = {
     "413": ("TooLarge", "The body is too large."),
     "415": ("UnknownBody", "The content type of the body is not accepted."),
 }
+# What operations answer that declare these statuses; the code says why.
+DECLARED: Mapping[str, str] = {
+    "409": "The state of the split or the submission does not allow this; `code` says why.",
+    "422": "A field is missing or has a value that is not accepted; `where` names it.",
+}
 HEADERS: Mapping[str, str] = {
     "RateLimit-Policy": "The limits of the client: name, requests (q), seconds (w).",
     "RateLimit": "What remains of them: name, requests (r), seconds until there are more (t).",
@@ -87,7 +92,8 @@ def _complete(responses: Node, *, has_body: bool) -> None:
     shared = {**ALWAYS, **(WITH_A_BODY if has_body else {})}
     for status, response in responses.items():
         response.setdefault("headers", {}).update(_headers(status))
-        response["description"] = response["description"] or shared.get(status, ("", ""))[1]
+        about = shared.get(status, ("", ""))[1] or DECLARED.get(status, "")
+        response["description"] = response["description"] or about
     for status, (name, _) in shared.items():
         responses.setdefault(status, {"$ref": f"#/components/responses/{name}"})
     for status in sorted(responses):

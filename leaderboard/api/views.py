@@ -54,7 +54,7 @@ class WithdrawView(APIView):
         responses={200: SubmissionSerializer, **errors(404, 422)},
     )
     def post(self, request: Request, submission_id: str) -> Response:
-        """Cancel a waiting submission; a published one leaves a tombstone row. Cannot be undone."""
+        """Cancel a waiting submission; if it is published, its row stays without values. Cannot be undone."""
         submission = get_object_or_404(visible(request), pk=submission_id)
         now = timezone.now()
         intake.withdraw(submission=submission, actor=cast("User", request.user), now=now)

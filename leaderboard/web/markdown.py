@@ -16,9 +16,9 @@ from leaderboard.web import equations
 Target = Callable[[str], str]
 # Where links may lead: pages of any host, mail, and places on this site.
 _TARGET: Final = re.compile(r"(?:https?:|mailto:|/|#|\?)", re.IGNORECASE)
-# Figures below each other, or words behind formulas: lines that must not wrap, where they are an output.
-_IN_COLUMNS: Final = re.compile(r"\S {3,}\S")
-_OUTPUTS: Final = {"", "console", "text"}
+# A cell up to so many characters stays in one line; a longer one than the second number gets a column's room.
+_MAX_TOGETHER: Final = 14
+_MIN_WRAPS: Final = 40
 # An option of a command, which a browser would break at its hyphens.
 _CODE: Final = re.compile(r"<code\b.*?</code>", re.DOTALL)
 _OPTION: Final = re.compile(r"(?<=[\s>\[])--?[a-z][\w-]*")
@@ -36,10 +36,11 @@ class TextHeading:
 
 @dataclass(frozen=True)
 class Part:
-    """The plain text below one heading, blocks of code last, for the search."""
+    """The plain text below one heading, code last, for the search; `prose` has no tables and code."""
 
     heading: TextHeading
     text: str
+    prose: str = ""
 
 
 @dataclass(frozen=True)
@@ -56,10 +57,13 @@ class Document:
         return [part.heading for part in self.parts if part.heading.level == 2]
 
 
-def guide(text: str, *, link: Target, image: Callable[[str], Mapping[str, str]]) -> Document:
+def guide(
+    text: str, *, link: Target, image: Callable[[str], Mapping[str, str]], path: Target = lambda _: ""
+) -> Document:
     """Render a guide of the project; a block of code in the language `math` is an equation.
 
-    `link` returns the target of an address, `image` the attributes of a picture.
+    `link` returns the target of an address, `image` the attributes of a picture, and `path` the page that
+    inline code names, if any.
     """
     tokens = _parser(images=True).parse(text)
     for token in _inline(tokens):
@@ -71,8 +75,10 @@ def guide(text: str, *, link: Target, image: Callable[[str], Mapping[str, str]])
         if token.type == "fence" and token.info == "math":
             token.type, token.content = "html_block", equations.mathml(token.content)
         if token.children and [child.type for child in token.children] == ["image"]:
-            token.children = _linked(token.children[0])
+            figure = token.children[0]  # it links to itself, where it can be enlarged
+            token.children = _linked(figure, str(figure.attrs["src"]), **{"class": "figure"})
         _typeset(token.children or [])
+        token.children = _paths_linked(token.children or [], path)
     return _document(tokens, _parser(images=True))
 
 
@@ -84,10 +90,18 @@ def _typeset(children: Sequence[Token]) -> None:
             code.type, code.content = "html_inline", equations.mathml(code.content, display="inline")
 
 
-def _linked(figure: Token) -> list[Token]:
-    # A figure links to itself, where it can be enlarged.
-    link: dict[str, str | int | float] = {"href": str(figure.attrs["src"]), "class": "figure"}
-    return [Token("link_open", "a", 1, attrs=link), figure, Token("link_close", "a", -1)]
+def _paths_linked(children: Sequence[Token], path: Target) -> list[Token]:
+    """Make links of inline code that names a page, outside of other links."""
+    drawn, depth = list[Token](), 0
+    for child in children:
+        depth += child.nesting if child.type in {"link_open", "link_close"} else 0
+        page = path(child.content) if child.type == "code_inline" and not depth else ""
+        drawn += _linked(child, page) if page else [child]
+    return drawn
+
+
+def _linked(token: Token, href: str, **attrs: str) -> list[Token]:
+    return [Token("link_open", "a", 1, attrs={"href": href, **attrs}), token, Token("link_close", "a", -1)]
 
 
 def page(text: str) -> Document:
@@ -116,33 +130,51 @@ def _inline(tokens: Sequence[Token]) -> list[Token]:
 def _document(tokens: list[Token], parser: MarkdownIt, *, table: str = _TABLE) -> Document:
     """Add anchors of headings and classes of tables, and collect the plain text of each part."""
     parts: list[Part] = []
-    heading, texts, code, anchors = TextHeading(0, "", ""), list[str](), list[str](), set[str]()
+    heading, texts, prose, code, anchors = (
+        TextHeading(0, "", ""),
+        list[str](),
+        list[str](),
+        list[str](),
+        set[str](),
+    )
     for at, token in enumerate(tokens):
         if token.type == "heading_open":
-            parts.append(Part(heading, " ".join(filter(None, [*texts, *code]))))
+            parts.append(Part(heading, " ".join(filter(None, [*texts, *code])), " ".join(prose)))
             words = _plain(tokens[at + 1])
-            heading, texts = TextHeading(int(token.tag[1]), words, _anchor(words, anchors)), []
-            code = []
+            heading = TextHeading(int(token.tag[1]), words, _anchor(words, anchors))
+            texts, prose, code = [], [], []
             token.attrSet("id", heading.anchor)
         elif token.type in {"fence", "code_block"}:
             code.append(token.content)
-            if token.info in _OUTPUTS and _IN_COLUMNS.search(token.content):
-                # Of a fence the attributes stand at the code within, beside the button that copies it.
-                token.type, token.attrs = "fence", {**token.attrs, "class": "aligned", "tabindex": 0}
+            # Without a language it is an output or a synopsis, which nobody copies.
+            token.type, token.info = "fence", token.info or "text"
         elif token.type == "inline" and tokens[at - 1].type != "heading_open":
-            texts.append(_cell(token) if tokens[at - 1].type in {"th_open", "td_open"} else _plain(token))
+            is_cell = tokens[at - 1].type in {"th_open", "td_open"}
+            texts.append(_cell(token) if is_cell else _plain(token))
+            prose += [] if is_cell else texts[-1:]
         elif token.type in {"th_open", "td_open"}:
-            if "right" in str(token.attrs.pop("style", "")):
-                token.attrSet("class", "number")
+            _shape(token, tokens[at + 1])
             if not tokens[at + 1].content:
                 token.tag = tokens[at + 2].tag = "td"  # a head without words names nothing
-    parts.append(Part(heading, " ".join(filter(None, [*texts, *code]))))
+    parts.append(Part(heading, " ".join(filter(None, [*texts, *code])), " ".join(prose)))
     html = parser.renderer.render(tokens, parser.options, {})
     html = _CODE.sub(lambda code: _OPTION.sub(r'<span class="together">\g<0></span>', code[0]), html)
     html = html.replace("<table>\n", table).replace("</table>", "</table>\n</div>")
     # The parser escapes what is no markup of its own.
     drawn = SafeString(html)
     return Document(drawn, tuple(part for part in parts if part.heading.level or part.text))
+
+
+def _shape(cell: Token, inline: Token) -> None:
+    """Keep a short cell in one line, and give a long one room."""
+    if "right" in str(cell.attrs.pop("style", "")):
+        cell.attrJoin("class", "number")
+    words = _plain(inline)
+    if cell.tag == "td" and (len(words) <= _MAX_TOGETHER or "±" in words):
+        for child in inline.children or ():
+            child.content = child.content.replace(" ", "\N{NO-BREAK SPACE}")
+    elif cell.tag == "td" and len(words) > _MIN_WRAPS:
+        cell.attrJoin("class", "wraps")
 
 
 def _plain(token: Token) -> str:

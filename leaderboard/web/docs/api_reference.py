@@ -8,11 +8,53 @@ from django.utils.html import format_html, format_html_join
 from drf_spectacular.generators import SchemaGenerator
 
 from evaluator.problems import PROBLEM_CODES
-from leaderboard.errors.problem_codes import API_CODES
+from leaderboard.errors.problem_codes import API_CODES, API_GROUPS
 
 Node = dict[str, Any]
-# What drf-spectacular appends for a choice whose label is its name, in any case.
-_BARE_CHOICE: Final = re.compile(r"^\* `([^`]+)` - \1$", re.MULTILINE | re.IGNORECASE)
+# What drf-spectacular appends for each choice: its name, and its label.
+_CHOICE: Final = re.compile(r"\s*^\* `([^`]+)` - (.+)$", re.MULTILINE)
+_GROUPS: Final = {
+    "Submissions": {
+        "submit": "Submit a file",
+        "submission": "Get a submission",
+        "list_submissions": "List your submissions",
+        "submission_file": "Download a prediction file",
+        "receipt": "Get the receipt of a score",
+        "withdraw": "Withdraw a submission",
+    },
+    "Splits and boards": {
+        "list_splits": "List the splits",
+        "manifest": "Get a manifest",
+        "croissant": "Get a manifest as a dataset",
+        "board": "Get a board",
+        "compare": "Compare methods",
+        "list_editions": "List the editions",
+        "edition_board": "Get the board of an edition",
+        "changelog": "List the changes of a board",
+    },
+    "Methods": {
+        "list_methods": "List your methods",
+        "method": "Get a method",
+        "edit_method": "Edit a method",
+        "preview_visibility": "Preview a publication",
+        "show_method": "Publish a method",
+    },
+    "Account": {
+        "account": "Get your account",
+        "quota": "Get your quota",
+        "revoke_token": "Revoke a token",
+    },
+    "Published results": {
+        "list_published_tables": "List the published tables",
+        "published_table": "Get a published table",
+    },
+    "Maintainers": {
+        "edition_progress": "Get the progress of a re-scoring",
+        "edition_preview": "Preview an edition",
+    },
+}
+"""By the titles of the page: operations and what they do."""
+_TITLES: Final = {name: title for group in _GROUPS.values() for name, title in group.items()}
 
 
 @cache
@@ -21,15 +63,20 @@ def reference() -> Node:
     schema = SchemaGenerator().get_schema(request=None, public=True)
     named = schema["components"]["schemas"]
     schemas = _inline_enums(named, named)
+    operations = [
+        _operation(method.upper(), path, node, schemas, schema["components"]["responses"])
+        for path, methods in _inline_enums(schema["paths"], named).items()
+        for method, node in methods.items()
+    ]
+    by_id = {operation["id"]: operation for operation in operations}
     return {
-        "operations": [
-            _operation(method.upper(), path, node, schemas, schema["components"]["responses"])
-            for path, methods in _inline_enums(schema["paths"], named).items()
-            for method, node in methods.items()
-        ],
+        "operations": operations,
+        "groups": [(title, [by_id[name] for name in names]) for title, names in _GROUPS.items()],
         "objects": [_object(name, node) for name, node in schemas.items() if "properties" in node],
-        "codes": API_CODES.items(),
-        "file_codes": [(code, about) for code, about in PROBLEM_CODES.items() if code not in API_CODES],
+        "codes": [
+            *((title, codes.items()) for title, codes in API_GROUPS.items()),
+            ("Problems of a file", [each for each in PROBLEM_CODES.items() if each[0] not in API_CODES]),
+        ],
     }
 
 
@@ -47,12 +94,13 @@ def _inline_enums(node: Any, named: Node) -> Any:
 
 
 def _operation(method: str, path: str, node: Node, schemas: Node, shared: Node) -> Node:
-    """Arrange one operation. Answers of every operation are references into `shared`."""
+    """Arrange one operation. Errors of every operation are references into `shared`."""
     parameters = sorted(node.get("parameters", []), key=lambda p: (p["in"] != "path", path.find(p["name"])))
     content = node.get("requestBody", {}).get("content", {})
     bodies = {media: schemas[_target(body["schema"])] for media, body in content.items()}
     return {
         "id": node["operationId"],
+        "title": _TITLES[node["operationId"]],
         "name": f"{method} {path}",
         "method": method,
         "path": path,
@@ -63,13 +111,13 @@ def _operation(method: str, path: str, node: Node, schemas: Node, shared: Node) 
         "answers": [
             (status, _kind(schema), answer["description"])
             for status, answer in sorted(node["responses"].items())
-            if "$ref" not in answer
+            if status < "4"
             for schema in [next(iter(answer.get("content", {"": {}}).values())).get("schema", {})]
         ],
         "errors": [
-            (status, shared[_target(answer)]["description"])
+            (status, (shared[_target(answer)] if "$ref" in answer else answer)["description"])
             for status, answer in sorted(node["responses"].items())
-            if "$ref" in answer
+            if status >= "4"
         ],
         "objects": [_object(name, schemas[name]) for name in _objects_in(node, schemas)],
     }
@@ -101,9 +149,15 @@ def _fields(node: Node) -> list[Node]:
 
 
 def _field(name: str, node: Node, is_required: bool) -> Node:
-    """Arrange a field or parameter; skip choices that only repeat the names in its kind."""
-    about = _BARE_CHOICE.sub("", node.get("description", "")).strip()
+    """Arrange a field or parameter."""
+    about = _CHOICE.sub(_choice, node.get("description", "")).strip()
     return {"name": name, "kind": _kind(node), "about": about, "is_required": is_required}
+
+
+def _choice(choice: re.Match[str]) -> str:
+    """Say what a choice means, and nothing where it only repeats the name in the field's kind."""
+    name, label = choice.groups()
+    return "" if name.replace("_", " ").lower() == label.lower() else f" `{name}`: {label}."
 
 
 def _target(node: Node) -> str:

@@ -9,10 +9,10 @@ from urllib.parse import urlsplit
 
 from django.conf import settings
 from django.templatetags.static import static
-from django.urls import reverse
+from django.urls import Resolver404, resolve, reverse
 
 from leaderboard.web import markdown
-from leaderboard.web.docs import python_reference
+from leaderboard.web.docs import api_examples, python_reference
 from leaderboard.web.markdown import Document
 
 _REPOSITORY: Final = Path(settings.BASE_DIR)
@@ -32,7 +32,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Command line": "cli",
         "Python": "python",
         "CI": "ci",
-        "API": "api-guide",
+        "API guide": "api-guide",
         "API reference": "",
         "Exports": "exports",
         "Permissions": "access",
@@ -53,10 +53,18 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Security": "security",
         "Reliability": "reliability",
     },
-    "For developers": {"Architecture": "architecture", "Decisions": "decisions"},
+    "For developers": {"Overview": "overview", "Architecture": "architecture", "Decisions": "decisions"},
 }
 _PYTHON: Final = "python"
 """The guide that the reference of the packages follows."""
+# Pages that a guide names by their paths, and that anybody may ask for.
+_PAGES: Final = frozenset(
+    re.findall(
+        r"[\w-]+",
+        "account account_data api-root api-schema api_reference compare dist docs feed_of_all mails "
+        "published submissions submit team tokens",
+    )
+)
 _SCHEMES: Final = {"http", "https", "mailto"}
 _VIEW_BOX: Final = re.compile(r'viewBox="0 0 ([0-9.]+) ([0-9.]+)"')
 
@@ -95,7 +103,6 @@ def navigation() -> list[tuple[str, list[GuideLink]]]:
     first = [
         GuideLink("At a glance", reverse("docs")),
         GuideLink("Install", reverse("dist")),
-        _entry("Overview", "overview"),
     ]
     return [
         ("", first),
@@ -121,14 +128,22 @@ def neighbours(name: str) -> tuple[GuideLink | None, GuideLink | None]:
 def guide(name: str) -> Document:
     """Render a guide, once in a process. Raises `KeyError`."""
     path = files()[name]
-    text = path.read_text(encoding="utf-8")
+    text = path.read_text(encoding="utf-8").replace(api_examples.SITE, settings.SITE_URL)
     if name == _PYTHON:
         text = f"{text}\n{python_reference.text()}"
 
     def link(address: str) -> str:
         return _link(address, source=path)
 
-    return markdown.guide(text, link=link, image=_image)
+    return markdown.guide(text, link=link, image=_image, path=_page)
+
+
+def _page(path: str) -> str:
+    """Return the path of a page of this site again, and of anything else an empty text."""
+    try:
+        return path if path.startswith("/") and resolve(path).view_name in _PAGES else ""
+    except Resolver404:
+        return ""
 
 
 def _link(address: str, *, source: Path) -> str:

@@ -3,36 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
-from typing import Any, Final
+from typing import Any
 
 from django.conf import settings
 
 from evaluator.counting import file_size
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PROTOCOLS, Protocol
 from evaluator.metrics.registry import WARNING_S, Metric
-from evaluator.problems import PROBLEM_CODES
 from leaderboard.boards import listing
 from leaderboard.models import Split
 from leaderboard.quotas import admissions
-
-# What only maintainers meet, when they import ground truth.
-GROUND_TRUTH_CODES: Final = frozenset(
-    {
-        "unreadable",
-        "bad-csv",
-        "missing-columns",
-        "bad-field",
-        "empty",
-        "duplicate-ids",
-        "duplicate-natural-keys",
-        "truth-not-finite",
-        "truth-near-zero",
-        "two-units",
-        "bad-digest",
-        "forbidden-pickle",
-        "bad-annotations",
-    }
-)
 
 
 def _as_in_toolkit(protocol: Protocol) -> str:
@@ -81,7 +61,4 @@ def docs(splits: Sequence[Split], *, now: datetime) -> dict[str, Any]:
         "warning_s": f"{WARNING_S:g}",
         "boundaries": [boundary.replace("-", "−") for boundary in protocol.boundaries],
         "max_size": file_size(settings.MAX_PREDICTIONS_BYTES),
-        "problem_codes": [
-            (code, meaning) for code, meaning in PROBLEM_CODES.items() if code not in GROUND_TRUTH_CODES
-        ],
     }

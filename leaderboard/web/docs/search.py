@@ -10,8 +10,11 @@ from django.utils.safestring import SafeString
 from leaderboard.web.docs import guides
 
 MAX_QUERY: Final = 100
-MAX_HITS: Final = 20
+MAX_HITS: Final = 12
+_MAX_COUNT: Final = 8
 _SNIPPET: Final = 200
+# Pages of names, where a word is often a name: what explains it comes first.
+_REFERENCES: Final = frozenset({"cli", "python"})
 _WORD: Final = re.compile(r"[^\W_]+")
 # A longer word also finds what begins with it: "quot" finds "quota", but "to" does not find "token".
 _MAX_SHORT: Final = 3
@@ -24,7 +27,7 @@ _FILLERS: Final = frozenset(
 
 
 class Hit(NamedTuple):
-    """A part of a guide; the snippet marks the words."""
+    """A part of a guide; `title` is empty where it is the beginning. The snippet marks the words."""
 
     title: str
     heading: str
@@ -35,7 +38,9 @@ class Hit(NamedTuple):
 def find(query: str) -> list[Hit]:
     """Return at most `MAX_HITS` parts, best first; those with some words if none has all."""
     typed = set(_WORD.findall(query.lower()))
-    asked = [_pattern(word) for word in sorted(typed - _FILLERS or typed)]
+    words = sorted(typed - _FILLERS or typed)
+    asked = [_pattern(word) for word in words]
+    exact = [_pattern(word, is_exact=True) for word in words]
     ranked = []
     for name in guides.files():
         guide = guides.guide(name)
@@ -43,28 +48,38 @@ def find(query: str) -> list[Hit]:
         is_background = name.startswith("adr/") or name == "changelog"
         for part in guide.parts:
             heading, text = part.heading, " ".join(part.text.split())
-            counts = [len(word.findall(f"{guide.title} {heading.text} {text}")) for word in asked]
+            everything = f"{guide.title} {heading.text} {text}"
+            counts = [len(word.findall(everything)) for word in asked]
             if any(counts):
-                in_heading = sum(bool(word.search(heading.text)) for word in asked)
-                in_title = sum(bool(word.search(guide.title)) for word in asked)
-                n_words = len(set(_WORD.findall(heading.text.lower())) - _FILLERS) or 1
-                score = 8 * in_heading * (1 + in_heading / n_words) + 4 * in_title
-                rank = (counts.count(0), is_background, -score - sum(min(count, 8) for count in counts))
+                n_beginnings = sum(word.search(everything) is None for word in exact)
+                score = _score(heading.text, guide.title, asked) - 4 * (name in _REFERENCES)
+                score += sum(min(count, _MAX_COUNT) for count in counts)
+                rank = (counts.count(0), n_beginnings, is_background, -score)
                 anchor = f"#{heading.anchor}" if heading.level > 1 else ""
                 address = reverse("guide", args=[name]) + anchor
-                hit = Hit(guide.title, heading.text if anchor else "", address, _snippet(text, asked))
+                names = (guide.title, heading.text) if anchor else ("", guide.title)
+                hit = Hit(*names, address, _snippet(text, " ".join(part.prose.split()), asked))
                 ranked.append((rank, hit))
     has_all = [each for each in ranked if each[0][0] == 0]
     return [hit for _, hit in sorted(has_all or ranked, key=lambda each: each[0])[:MAX_HITS]]
 
 
-def _pattern(word: str) -> re.Pattern[str]:
-    end = r"[^\W_]*" if len(word) > _MAX_SHORT else r"(?:e?s)?(?![^\W_])"
+def _score(heading: str, title: str, asked: list[re.Pattern[str]]) -> float:
+    """Say how well a heading, in a guide with a title, names what is asked for."""
+    in_heading = sum(bool(word.search(heading)) for word in asked)
+    n_words = len(set(_WORD.findall(heading.lower())) - _FILLERS) or 1
+    return 8 * in_heading * (1 + in_heading / n_words) + 4 * sum(bool(word.search(title)) for word in asked)
+
+
+def _pattern(word: str, *, is_exact: bool = False) -> re.Pattern[str]:
+    end = r"[^\W_]*" if len(word) > _MAX_SHORT and not is_exact else r"(?:e?s)?(?![^\W_])"
     return re.compile(rf"(?<![^\W_]){re.escape(word)}{end}", re.IGNORECASE)
 
 
-def _snippet(text: str, asked: list[re.Pattern[str]]) -> SafeString:
+def _snippet(text: str, prose: str, asked: list[re.Pattern[str]]) -> SafeString:
+    """Return prose with the words, or the beginning of any prose, or what else has the words."""
     marked = re.compile("(" + "|".join(word.pattern for word in asked) + ")", re.IGNORECASE)
+    text = prose or text
     first = marked.search(text)
     begin = text.rfind(" ", 0, max(0, first.start() - 60)) + 1 if first else 0
     end = len(text) if len(text) <= begin + _SNIPPET else text.rfind(" ", 0, begin + _SNIPPET)

@@ -68,11 +68,16 @@ def test_a_part_has_the_text_below_its_heading() -> None:
     ]
 
 
-def test_code_in_columns_is_a_box_that_scrolls_and_other_code_wraps() -> None:
-    boxed = '<code class="aligned" tabindex="0">a    1'
+def test_code_without_a_language_is_an_output_which_gets_no_button() -> None:
     for text in ("```\na    1\nbb   2\n```\n", "    a    1\n    bb   2\n"):
-        assert boxed in markdown.page(text).html
-    assert "aligned" not in markdown.page("```sh\ntsttc check a.json    # --manifest\n```\n").html
+        assert '<code class="language-text">a    1' in markdown.page(text).html
+    assert "language-sh" in markdown.page("```sh\ntsttc check a.json    # --manifest\n```\n").html
+
+
+def test_short_cells_stay_in_one_line_and_long_ones_get_room() -> None:
+    drawn = markdown.page(f"| a | b |\n|---|---|\n| 93.3 ± 0.6 | {'word ' * 9}|\n").html
+    assert "<td>93.3\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}0.6</td>" in drawn
+    assert '<td class="wraps">word word' in drawn
 
 
 def test_an_option_of_a_command_does_not_break_at_its_hyphens() -> None:

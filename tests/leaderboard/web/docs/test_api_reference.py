@@ -1,7 +1,6 @@
 """The API reference."""
 
 import json
-import re
 from collections.abc import Iterator
 
 from django.test import Client
@@ -26,9 +25,15 @@ def described() -> Iterator[tuple[str, dict[str, str]]]:
 
 
 def words(node: dict[str, str]) -> str:
-    """A description as the page shows it: no backticks, and no choices that repeat their names."""
-    about = re.sub(r"^\* `([^`]+)` - \1$", "", node["description"], flags=re.MULTILINE | re.IGNORECASE)
-    return " ".join(about.replace("`", "").split())
+    """A description as the page shows it: no backticks and bullets, and no choices that repeat names."""
+    about = []
+    for line in node["description"].replace("`", "").split("\n"):
+        name, is_choice, label = line.removeprefix("* ").partition(" - ")
+        if not line.startswith("* "):
+            about.append(line)
+        elif is_choice and name.replace("_", " ").lower() != label.lower():
+            about.append(f"{name}: {label}.")
+    return " ".join(" ".join(about).split())
 
 
 def get(client: Client) -> pages.Element:
@@ -47,13 +52,17 @@ def openapi_operations() -> list[dict[str, str]]:
 def test_every_operation_of_the_schema_is_described(client: Client, benchmark: None) -> None:
     schema = client.get(reverse("api-schema"), headers={"accept": "application/vnd.oai.openapi+json"}).json()
     table = get(client).one("table", class_="operations")
-    described = {f"{tr.all('td')[0].text} {tr.one('a').text}" for tr in table.one("tbody").all("tr")}
+    rows = [tr for body in table.all("tbody") for tr in body.all("tr") if tr.all("td")]
+    described = {f"{tr.all('td')[0].text} {tr.all('code')[1].text}" for tr in rows}
     assert described == {
         f"{method.upper()} {path}" for path, methods in schema["paths"].items() for method in methods
     }
     for operation in openapi_operations():
-        h1 = pages.get(client, f"/docs/api/{operation['operationId']}/").one("h1", class_="operation")
-        assert h1.text in described
+        page = operation_page(client, operation["operationId"])
+        assert page.one("p", class_="operation").text in described
+        assert page.one("h1").text in {tr.one("a").text for tr in rows}
+        assert "409 Error" not in page.text
+        assert "* " not in " ".join(cell.text for cell in page.all("td"))
 
 
 def test_every_field_and_parameter_is_on_the_page_with_its_description(

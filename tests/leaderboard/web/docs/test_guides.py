@@ -65,6 +65,15 @@ def test_a_visitor_finds_the_empty_template_in_the_docs_and_a_way_on_from_a_miss
     assert {"/board/test/", "/board/val/"} <= {a.attributes["href"] for a in missing.all("a")}
 
 
+def test_a_guide_links_public_pages_that_it_names_and_shows_the_address_of_the_site(
+    client: Client, benchmark: None
+) -> None:
+    assert pages.get(client, "/docs/cli/").all("a", href="/dist/") != []
+    assert "leaderboard.example.org" not in pages.get(client, "/docs/cli/").text
+    drawn = pages.get(client, "/docs/maintainers/")
+    assert [a for a in drawn.one("article").all("a") if a.attributes["href"].startswith("/maintain/")] == []
+
+
 # --- search ----------------------------------------------------------------------------------------------
 
 
@@ -91,6 +100,14 @@ def test_what_people_look_for_is_among_the_first_five(
 ) -> None:
     first = [href for href, _ in search_hits(client, query)[:5]]
     assert any(href.startswith(address) for href in first), first
+
+
+def test_what_explains_a_word_comes_first_and_longer_words_with_its_beginning_last(
+    client: Client, benchmark: None
+) -> None:
+    hits = search_hits(client, "quota")
+    assert hits[0][0] == "/docs/access/#quotas"
+    assert not [text for _, text in hits[:5] if "quotation" in text]
 
 
 def test_the_words_asked_for_are_marked_and_are_never_markup(client: Client, benchmark: None) -> None:
