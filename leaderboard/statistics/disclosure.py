@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 STEPS_IN_A_WIDTH: Final = 10
 _ROUND: Final = (5, 2, 1)
 HIDDEN_METRICS: Final = frozenset({MID, RTE})
-"""The metrics of hidden splits; any other one would tell more of the values than `docs/scoring.md` says."""
+"""The metrics of hidden splits; any other one would reveal more than `docs/hidden-values.md` says."""
 
 
 # --- how fine --------------------------------------------------------------------------------------------

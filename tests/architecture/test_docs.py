@@ -1,4 +1,4 @@
-"""Documents name what is there: links, headings, modules, rooms; and none is left out of a list."""
+"""Documents name what is there: links, headings, modules, packages; and none is left out of a list."""
 
 import re
 from urllib.parse import unquote
@@ -49,9 +49,9 @@ def test_files_that_documents_and_docstrings_name_are_there() -> None:
     assert missing == []
 
 
-def test_the_page_of_the_architecture_lists_every_room() -> None:
+def test_the_page_of_the_architecture_lists_every_package() -> None:
     page = (DOCS / "architecture.md").read_text(encoding="utf-8")
-    rooms = {path.parent.name for path in (REPOSITORY / "leaderboard").glob("*/__init__.py")}
-    table = page.partition("## The rooms")[2].partition("## ")[0]
+    packages = {path.parent.name for path in (REPOSITORY / "leaderboard").glob("*/__init__.py")}
+    table = page.partition("## The packages")[2].partition("## ")[0]
     first_cells = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
-    assert set(re.findall(r"`(\w+)/`", " ".join(first_cells))) == rooms
+    assert set(re.findall(r"`(\w+)/`", " ".join(first_cells))) == packages

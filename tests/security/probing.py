@@ -1,6 +1,6 @@
 """What one more submission tells of hidden labels, with two decimals and with the one that is published.
 
-    python -m tests.security.probing          the table of docs/scoring.md, some minutes
+    python -m tests.security.probing          the table of docs/hidden-values.md, some minutes
     python -m tests.security.probing --quick  a small one
 
 File 0 predicts ln α10 = 0.6 for every sequence. That is above every true value, so MiD is linear in what is

@@ -24,7 +24,9 @@ _NAMES: Final = {"index": "overview", "api": "api-guide", "adr/README": "decisio
 _SECTIONS: Final[dict[str, dict[str, str]]] = {
     "For researchers": {
         "Quick start for researchers": "researchers",
+        "Train a network": "training",
         "Baselines": "baselines",
+        "Reproduce the paper": "reproduce",
         "Deep Scale": "deep-scale",
         "Models": "models",
         "Annotation": "annotation",
@@ -46,11 +48,13 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Changelog": "changelog",
     },
     "For maintainers": {
-        "Quick start for maintainers": "maintainers",
+        "Quick start for maintainers": "hosting",
+        "Maintenance": "maintainers",
         "Operations": "operations",
         "Host another dataset": "another-dataset",
         "Capacity": "capacity",
         "Security": "security",
+        "Hidden values": "hidden-values",
         "Reliability": "reliability",
     },
     "For developers": {"Overview": "overview", "Architecture": "architecture", "Decisions": "decisions"},
