@@ -38,7 +38,7 @@ class MethodForm(DetailsForm):
     @classmethod
     def of_method(cls, request: HttpRequest, *, method: Method) -> "MethodForm":
         form = cls.asked(request, initial=_stated(method))
-        form.fields["description"].widget.attrs["rows"] = 9
+        form.fields["description"].widget.attrs["rows"] = 14
         return form
 
     def changes(self) -> dict[str, object]:
