@@ -145,7 +145,8 @@ def submission_table(submissions: Iterable[Submission]) -> dict[str, Any]:
             for value in [values.get(name)]
         ]
         rows.append((submission, evaluation, cells, _reason(evaluation)))
-    return {"errors": errors, "rows": rows}
+    has_people = len({submission.submitted_by_id for submission, _ in evaluations}) > 1
+    return {"errors": errors, "rows": rows, "has_people": has_people}
 
 
 def _reason(evaluation: Evaluation) -> str:
