@@ -23,7 +23,7 @@ _MAX_STRAIGHT: Final = 6.0
 NARROW_PX: Final = 600
 # Of a legend: px of its line, and of a name in it.
 _LEGEND_PX: Final = {"wide": (NARROW_PX, 480), "narrow": (348, 310), "narrowest": (290, 250)}
-# Where panels stand one above the other: their height in site.css, by how many they are, and what each needs above.
+# Where panels stand one above the other: their height in site.css by how many they are, and what is above one.
 _STACKED_PX: Final = {2: 704, 3: 896}
 _HEAD_PX: Final = 50
 _LEFT_PX: Final = 44
@@ -251,7 +251,10 @@ class Frame:
         if not is_narrow:
             line_px = max(line_px, NARROW_PX * n_panels // 2)
         top = 38 + self.top + 24 * self._n_legend_lines(line_px, name_px)
-        layout = {"legend": self._legend(name_px), "grid": _grids(n_panels, left=left, top=top, is_narrow=is_narrow)}
+        layout = {
+            "legend": self._legend(name_px),
+            "grid": _grids(n_panels, left=left, top=top, is_narrow=is_narrow),
+        }
         if self.series_by_width[is_narrow]:
             layout["series"] = list(self.series_by_width[is_narrow])
         if n_panels > 1:  # one above the other, only the last has room for a name below it
