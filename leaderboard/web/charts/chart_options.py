@@ -23,7 +23,7 @@ _MAX_STRAIGHT: Final = 6.0
 NARROW_PX: Final = 600
 # Of a legend: px of its line, and of a name in it.
 _LEGEND_PX: Final = {"wide": (NARROW_PX, 480), "narrow": (348, 310), "narrowest": (290, 250)}
-# Where panels stand one above the other: their height in site.css by how many they are, and what is above one.
+# Where panels stand one above the other: their height in site.css by how many they are; what is above each.
 _STACKED_PX: Final = {2: 704, 3: 896}
 _HEAD_PX: Final = 50
 _LEFT_PX: Final = 44
