@@ -81,7 +81,8 @@ function show(methods, isAsked = false) {
     box.checked = methods.some(({ id }) => id === box.value);
     box.disabled = !box.checked && methods.length >= MAX_METHODS;
   }
-  tray.hidden = methods.length === 0 && !isAsked;
+  // The page that asks which methods says so from the beginning.
+  tray.hidden = methods.length === 0 && !isAsked && view() !== null;
   tray.querySelector("[role=status]").textContent = words(methods.length);
   tray.querySelector("ul").replaceChildren(
     ...methods.map(({ id, name }) => {

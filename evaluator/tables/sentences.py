@@ -117,23 +117,23 @@ def influence(first: str, second: str, *, difference: Difference) -> str:
     >>> from evaluator.scoring.significance import Influence
     >>> difference = Difference(-0.4, -0.5, -0.2, 0.0003, influence=Influence(700, 39, 59))
     >>> print(influence("A", "B", difference=difference))
-    The difference stays significant until the 39 of 700 recordings most in favour of A are left out; \
-without 59, it has the other sign.
+    Leave out the 39 of 700 recordings that most favour A, and the difference is no longer significant; \
+leave out 59, and B is better.
     >>> influence("A", "B", difference=Difference(0.1, -0.2, 0.4, 0.4, influence=Influence(700, None, 2)))
-    'Without the 2 of 700 recordings most in favour of B, the difference has the other sign.'
+    'Leave out the 2 of 700 recordings that most favour B, and A is better.'
     """
     known = difference.influence
     if known is None or not difference.difference:
         return ""
-    better = first if difference.difference < 0 else second
+    better, worse = (first, second) if difference.difference < 0 else (second, first)
     few, turn = known.n_to_undecided, known.n_to_turn
     if few is None and turn is None:
         return ""
-    of_all, most = in_words(difference.unit, known.n_units), f"most in favour of {better}"
+    of_all = f"of {in_words(difference.unit, known.n_units)} that most favour {better}"
     if few is None:
-        return f"Without the {turn:,} of {of_all} {most}, the difference has the other sign."
-    head = f"The difference stays significant until the {few:,} of {of_all} {most} are left out"
-    return f"{head}." if turn is None else f"{head}; without {turn:,}, it has the other sign."
+        return f"Leave out the {turn:,} {of_all}, and {worse} is better."
+    head = f"Leave out the {few:,} {of_all}, and the difference is no longer significant"
+    return f"{head}." if turn is None else f"{head}; leave out {turn:,}, and {worse} is better."
 
 
 def selection(n_tried: Mapping[str, int]) -> str:

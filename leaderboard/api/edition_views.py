@@ -112,7 +112,7 @@ class PreviewSerializer(serializers.Serializer[preview.Preview]):
         help_text="Sequences whose anno_id changes; null: not compared.",
         **NULLABLE,
     )
-    n_changed = serializers.IntegerField(help_text="Submissions whose scores change.")
+    n_changed = serializers.IntegerField(help_text="Submissions whose status, scores or rank change.")
     n_moved = serializers.IntegerField(help_text="Submissions whose rank changes.")
     n_newly_rejected = serializers.IntegerField(help_text="Submissions that it cannot score.")
     progress = RescoringSerializer(help_text="Progress of its scoring.")

@@ -52,8 +52,9 @@ class Change:
 
     @property
     def is_changed(self) -> bool:
-        """Tell whether anything public changes."""
-        return (self.old_status, self.old, self.old_rank) != (self.new_status, self.new, self.new_rank)
+        """Tell whether its state, rank or any score changes; a score that neither edition has does not."""
+        is_moved = (self.old_status, self.old_rank) != (self.new_status, self.new_rank)
+        return is_moved or any(self.old.get(name) != self.new.get(name) for name in self.delta)
 
 
 @dataclass(frozen=True)

@@ -122,12 +122,14 @@ def compare(
     now: datetime,
     edition: Edition | None = None,
     address: str = "",
+    best_first: bool = False,
 ) -> Compared:
     """Compare two to five methods on the published board or a named edition.
 
-    Queues pairs that are not computed; they have `differences` None. Pairs that `disclosure.why_withheld`
-    names have only the difference of the published values. Raises `BadComparison`, `UnknownMethod`,
-    `NotOnTheBoard`, and `comparison_queue.TooManyComparisons` by account or `address`.
+    `best_first` orders three or more by the score that ranks. Queues pairs that are not computed; they have
+    `differences` None. Pairs that `disclosure.why_withheld` names have only the difference of the published
+    values. Raises `BadComparison`, `UnknownMethod`, `NotOnTheBoard`, and
+    `comparison_queue.TooManyComparisons` by account or `address`.
     """
     board = snapshots.board(split=split, edition=edition, viewer=viewer)
     if board.edition is None:
@@ -135,6 +137,8 @@ def compare(
     # It is at hand, and would be asked for again.
     board.edition.split = board.split
     chosen = _chosen(board, methods, viewer)
+    if best_first and len(chosen) > MIN_METHODS:
+        chosen.sort(key=lambda entry: entry.value or 0.0)
     asked = list(itertools.combinations(chosen, 2))
     withheld = _withheld(board.edition, asked)
     known = _known(board.edition, chosen)

@@ -100,7 +100,7 @@ def page(text: str) -> Document:
     for token in _inline(tokens):
         if "href" in token.attrs and not _TARGET.match(str(token.attrs["href"])):
             token.attrSet("href", "#")
-    return _document(tokens, parser)
+    return _document(tokens, parser, table=_TABLE.replace('"list"', '"list cards"'))
 
 
 @cache
@@ -113,7 +113,7 @@ def _inline(tokens: Sequence[Token]) -> list[Token]:
     return [child for token in tokens for child in token.children or ()]
 
 
-def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
+def _document(tokens: list[Token], parser: MarkdownIt, *, table: str = _TABLE) -> Document:
     """Add anchors of headings and classes of tables, and collect the plain text of each part."""
     parts: list[Part] = []
     heading, texts, code, anchors = TextHeading(0, "", ""), list[str](), list[str](), set[str]()
@@ -139,7 +139,7 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
     parts.append(Part(heading, " ".join(filter(None, [*texts, *code]))))
     html = parser.renderer.render(tokens, parser.options, {})
     html = _CODE.sub(lambda code: _OPTION.sub(r'<span class="together">\g<0></span>', code[0]), html)
-    html = html.replace("<table>\n", _TABLE).replace("</table>", "</table>\n</div>")
+    html = html.replace("<table>\n", table).replace("</table>", "</table>\n</div>")
     # The parser escapes what is no markup of its own.
     drawn = SafeString(html)
     return Document(drawn, tuple(part for part in parts if part.heading.level or part.text))

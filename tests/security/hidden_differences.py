@@ -1,6 +1,6 @@
 """How often the published interval of a hidden split's difference holds the true difference.
 
-    python -m tests.security.hidden_differences          the table of docs/uncertainty.md, about a minute
+    python -m tests.security.hidden_differences          the figures of docs/uncertainty.md, about a minute
     python -m tests.security.hidden_differences 400      with so many repetitions of each row
 
 Two methods differ by δ in truth, on 150 recordings whose differences are symmetric. What a hidden split

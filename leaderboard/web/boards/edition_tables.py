@@ -1,7 +1,7 @@
-"""Tables of editions: changes in words, progress of re-scoring, and the preview."""
+"""Tables of editions: changes in words, and progress of re-scoring."""
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any
 
 from evaluator.counting import counted
 from evaluator.metrics.protocol import primary_value
@@ -9,14 +9,9 @@ from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import history
 from leaderboard.editions.corrections import RescoringProgress
-from leaderboard.editions.preview import ABSENT, Change, Preview
 from leaderboard.models import Edition, Evaluation, GroundTruth, Publication, Split, Status
 from leaderboard.web.boards import tables
-from leaderboard.web.boards.score_columns import column_css, score_heading
 from leaderboard.web.formatting import duration, grouped
-
-_ENDED_BADLY: Final = (Status.REJECTED, Status.SYSTEM_ERROR, Status.CANCELLED)
-_STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}
 
 
 def truth_words(change: history.TruthChange | None) -> str:
@@ -121,20 +116,19 @@ def _value_text(evaluation: Evaluation | None) -> str:
 
 def running(edition: Edition, progress: RescoringProgress) -> dict[str, Any]:
     """Return the progress of a re-scoring; a waiting page sends `seen` to ask for news."""
-    parts = [f"{grouped(progress.n_done)} of {grouped(progress.n_total)}"]
-    if progress.n_rejected:
-        parts.append(f"{grouped(progress.n_rejected)} rejected")
-    if progress.n_failed:
-        parts.append(f"{grouped(progress.n_failed)} with a system error")
-    if progress.n_cancelled:
-        parts.append(f"{grouped(progress.n_cancelled)} cancelled")
+    ends = (
+        (progress.n_scored, "scored"),
+        (progress.n_rejected, "rejected"),
+        (progress.n_failed, "with a system error"),
+        (progress.n_cancelled, "cancelled"),
+    )
     pace = ""
     if progress.rate_per_s is not None:
         pace = f"{rate_words(progress.rate_per_s)}, about {duration(progress.left_s)} left"
     return {
         "edition": edition,
         "progress": progress,
-        "counts": ", ".join(parts),
+        "counts": ", ".join(f"{grouped(n)} {end}" for n, end in ends if n),
         "pace": pace,
         "is_final": progress.n_waiting == 0,
         "seen": f"{progress.n_done}-{progress.n_total}",
@@ -148,71 +142,3 @@ def rate_words(rate_per_s: float) -> str:
     ('41.7 per second', '15 per minute')
     """
     return f"{rate_per_s:.1f} per second" if rate_per_s >= 1 else f"{60 * rate_per_s:.0f} per minute"
-
-
-def change_table(preview: Preview) -> dict[str, Any]:
-    """Return the preview for the template."""
-    primary = preview.edition.rules.primary.name
-    return {
-        "headings": [score_heading(name, primary=primary) for name in preview.names],
-        "rows": [_change_row(change, preview.names, primary=primary) for change in preview.entries],
-        "n_rejected_in_both": len(preview.changes) - len(preview.entries),
-        "truth": _change_words(preview.truth, preview.published, preview.edition),
-        "totals": _totals(preview),
-    }
-
-
-def _totals(preview: Preview) -> tuple[tuple[str, str], ...]:
-    truth = preview.truth
-    sequences: tuple[tuple[str, str], ...] = (("sequences", "not compared"),)
-    if truth is not None:
-        sequences = (
-            ("sequences added", grouped(truth.n_added)),
-            ("sequences removed", grouped(truth.n_removed)),
-            ("labels changed", grouped(truth.n_changed)),
-            ("anno_id changed", "not counted" if truth.n_renumbered is None else grouped(truth.n_renumbered)),
-        )
-    return (
-        *sequences,
-        ("entries", grouped(len(preview.entries))),
-        ("entries changed", grouped(preview.n_changed)),
-        ("ranks changed", grouped(preview.n_moved)),
-        ("newly rejected", grouped(preview.n_newly_rejected)),
-    )
-
-
-def _change_row(change: Change, names: Sequence[str], *, primary: str) -> dict[str, Any]:
-    old_status, new_status = (_STATUS_LABELS[s] for s in (change.old_status, change.new_status))
-    is_news = change.problems and change.old_status != change.new_status
-    reason = change.problems[0]["message"] if is_news else ""
-    return {
-        "change": change,
-        "has_changed": change.old_rank != change.new_rank,
-        "status": new_status if old_status == new_status else f"{new_status}, was {old_status}",
-        "is_worse_off": change.old_status == Status.SCORED and change.new_status in _ENDED_BADLY,
-        "differences": [_difference(name, change, primary=primary) for name in names],
-        "summary": reason.partition(": ")[0],
-        "reason": reason,  # why it is rejected now and was not
-        "n_more_problems": max(0, len(change.problems) - 1),
-    }
-
-
-def _difference(name: str, change: Change, *, primary: str) -> dict[str, str]:
-    delta, css = change.delta[name], column_css(name, primary=primary).replace("wide", "")
-    return {
-        "old": format_rounded(change.old.get(name), decimals=change.old_decimals),
-        "new": format_rounded(change.new.get(name), decimals=change.new_decimals),
-        "delta": delta_words(delta, decimals=max(change.old_decimals, change.new_decimals)),
-        "css": css if delta else f"{css} same".strip(),
-    }
-
-
-def delta_words(delta: float | None, *, decimals: int = 2) -> str:
-    """Format a difference with its sign.
-
-    >>> delta_words(0.09), delta_words(-1.5), delta_words(0.0), delta_words(None)
-    ('+0.09', '−1.50', '0.00', '')
-    """
-    if delta is None:
-        return ""
-    return f"{delta:+.{decimals}f}".replace("-", "−") if delta else f"{0:.{decimals}f}"

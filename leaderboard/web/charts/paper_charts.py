@@ -15,7 +15,7 @@ from evaluator.metrics.registry import Metric
 from evaluator.papers.tables import PublishedRow, PublishedTable, published_tables
 from evaluator.tables import published
 from evaluator.tables.formats import FORMATS
-from evaluator.tables.published import PrintedTable, method_name, setting_text
+from evaluator.tables.published import PrintedRow, PrintedTable, method_name, setting_text
 from leaderboard.web.charts.chart_options import (
     Chart,
     Frame,
@@ -116,13 +116,60 @@ def _values(table: PublishedTable, metric: Metric) -> list[float]:
 DOWNLOADS: Final = tuple(each for each in FORMATS if each.name in {"csv", "latex", "markdown"})
 
 
+_WHY: Final = " Why: "
+"""In a note, between what is so and its derivation, which the page folds."""
+
+
+def _groups(tables: Sequence[PrintedTable]) -> dict[str, list[PrintedTable]]:
+    """Group the tables for the index: what was measured, what was varied, and what the data is."""
+    groups: dict[str, list[PrintedTable]] = {"Results": [], "Ablations": [], "Dataset": []}
+    for each in tables:
+        kind = "Ablations" if each.table.parameter else "Results"
+        groups[kind if each.table.is_result else "Dataset"].append(each)
+    return groups
+
+
+def _with_best(shown: PrintedTable) -> list[tuple[PrintedRow, frozenset[int]]]:
+    """Return the rows, each with the places of the values that are lowest in their split, of main results."""
+    if not shown.table.is_result or shown.table.parameter:
+        return [(row, frozenset()) for row in shown.rows]
+    lowest: dict[tuple[str, int], float] = {}
+    for row in shown.rows:
+        for i, text in enumerate(row.cells[shown.n_names :], start=shown.n_names):
+            lowest[row.cells[0], i] = min(float(text), lowest.get((row.cells[0], i), float("inf")))
+    return [
+        (
+            row,
+            frozenset(
+                i
+                for (split, i), low in lowest.items()
+                if split == row.cells[0] and float(row.cells[i]) == low
+            ),
+        )
+        for row in shown.rows
+    ]
+
+
 @gzip_page
 @require_safe
 def published_page(request: HttpRequest) -> HttpResponse:
     if not settings.BENCHMARK.has_paper_tables:
         raise Http404("This benchmark has no tables of a paper.")
-    shown = [{"shown": each, "chart": sweep(each)} for each in published.printed_tables()]
-    context = {"tables": shown, "source": published_tables().source, "downloads": DOWNLOADS}
+    printed = published.printed_tables()
+    context = {
+        "tables": [
+            {
+                "shown": each,
+                "chart": sweep(each),
+                "rows": _with_best(each),
+                "notes": [note.partition(_WHY)[::2] for note in each.table.notes],
+            }
+            for each in printed
+        ],
+        "groups": _groups(printed),
+        "source": published_tables().source,
+        "downloads": DOWNLOADS,
+    }
     return render(request, "charts/published.html", context)
 
 

@@ -47,6 +47,7 @@ def compare(request: HttpRequest) -> HttpResponse:
             viewer=request.user,
             now=timezone.now(),
             address=rate_limits.address_of(request),
+            best_first=True,
         )
     except (comparisons.BadComparison, comparison_queue.TooManyComparisons) as refusal:
         return _refused(request, split, refusal)

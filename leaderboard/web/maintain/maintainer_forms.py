@@ -4,7 +4,7 @@ from typing import Any, Final
 
 from django import forms
 
-from evaluator.metrics.protocol import PROTOCOLS
+from evaluator.metrics.protocol import PROTOCOLS, Protocol
 from leaderboard.models import GroundTruth, Split
 from leaderboard.web.forms import SiteForm
 
@@ -20,6 +20,18 @@ def reason_field(help_text: str, *, at: str = "audit log", max_length: int = 100
     )
 
 
+def _protocol_words(protocol: Protocol) -> str:
+    """Tell protocols apart.
+
+    >>> _protocol_words(PROTOCOLS["tsttc-2"]), _protocol_words(PROTOCOLS["toolkit"])
+    ('MiD, RTE, WE; truncates predictions near 0', 'MiD, RTE; rejects predictions that have no MiD')
+    """
+    near_zero = (
+        "truncates predictions near 0" if protocol.near_zero_s else "rejects predictions that have no MiD"
+    )
+    return f"{', '.join(metric.symbol for metric in protocol.metrics)}; {near_zero}"
+
+
 class OpenForm(SiteForm):
     digest = forms.ChoiceField(
         label="Ground truth",
@@ -29,7 +41,7 @@ class OpenForm(SiteForm):
         },
     )
     protocol = forms.ChoiceField(
-        choices=[(name, name) for name in PROTOCOLS],
+        choices=[(name, _protocol_words(protocol)) for name, protocol in PROTOCOLS.items()],
         error_messages={
             "required": "No protocol was chosen; expected one of those listed.",
             "invalid_choice": f"There is no such protocol; expected one of {', '.join(PROTOCOLS)}.",
@@ -46,7 +58,8 @@ class OpenForm(SiteForm):
 
 class ReasonForm(SiteForm):
     reason = reason_field(
-        "One or two sentences, for the public changelog and the audit log.", at="public changelog"
+        "One or two sentences. The public changelog and the notice to the teams show them.",
+        at="public changelog",
     )
 
 

@@ -21,7 +21,7 @@ from leaderboard.pages import texts
 from leaderboard.web.boards import edition_tables, tables
 from leaderboard.web.decorators import asks_first
 from leaderboard.web.forms import SiteForm
-from leaderboard.web.maintain import queue_tables
+from leaderboard.web.maintain import preview_tables, queue_tables
 from leaderboard.web.maintain.maintainer_forms import (
     DiscardForm,
     OpenForm,
@@ -61,23 +61,26 @@ def maintainers_form(view: View) -> View:
 @maintainers_only
 @require_safe
 def hub(request: HttpRequest) -> HttpResponse:
-    """Show every split with its board, editions in preparation and failures."""
+    """Show what waits for a decision, then every page and the editions of every split."""
     rows = Split.objects.select_related("current_edition__ground_truth")
     desks = [
         (desk, [edition_tables.running(*each) for each in desk["in_preparation"]])
         for desk in map(history.maintainer_overview, rows)
     ]
     is_running = any(not shown["is_final"] for _, running in desks for shown in running)
+    has_imprint = texts.current(texts.IMPRINT) is not None
+    is_waiting = not has_imprint or any(running or desk["system_errors"] for desk, running in desks)
     context = {
         "desks": desks,
         "is_running": is_running,
+        "is_waiting": is_waiting,
         "queue": queue_tables.totals(),
         "n_overrides": QuotaOverride.objects.count(),
         "n_teams": Team.objects.count(),
         "n_published": splits.quoted().count(),
         "n_pages": len(texts.PAGES),
         "n_events": AuditEvent.objects.count(),
-        "has_imprint": texts.current(texts.IMPRINT) is not None,
+        "has_imprint": has_imprint,
     }
     return render(request, "maintain/hub.html", context)
 
@@ -199,7 +202,7 @@ def _comparison(row: Edition) -> dict[str, Any]:
     return {
         "edition": row,
         "preview": compared,
-        "table": edition_tables.change_table(compared),
+        "table": preview_tables.change_table(compared),
         "running": edition_tables.running(row, compared.progress),
     }
 

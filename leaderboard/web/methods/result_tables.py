@@ -53,8 +53,9 @@ class ResultTable:
         return any(cell.interval for row in self.rows for cell in row.cells)
 
     @property
-    def has_with_best(self) -> bool:
-        return any(cell.is_with_best for row in self.rows for cell in row.cells)
+    def has_marks(self) -> bool:
+        cells = [cell for row in self.rows for cell in row.cells]
+        return any(cell.is_best or cell.is_second or cell.is_with_best for cell in cells)
 
 
 def result_table(entry: Entry, counts: Mapping[str, int]) -> ResultTable:
@@ -88,6 +89,8 @@ def method_result(result: Result, pairs: Sequence[Pair]) -> dict[str, Any]:
         "table": edition_table(entry, result.edition),
         "card": score_card(entry, result.rows, n_ranked=result.n_ranked, gap=gap),
         "gaps": gaps,
+        "is_tested": any(not each.why_not_tested for each in gaps),
+        "why_not_tested": dict.fromkeys(each.why_not_tested for each in gaps if each.why_not_tested),
         "history": whiskers.sparkline(values) if len(values) > 1 and is_ordered else "",
         "rank_range": rank_range(entry),
         "errors": result.edition.rules.metrics,

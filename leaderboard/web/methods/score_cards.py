@@ -40,6 +40,7 @@ class ScoreCard(NamedTuple):
     gap: Gap | None  # to the best of the others
     strip: SafeString
     strip_words: str
+    ends: tuple[str, str]  # the lowest and the highest value on the strip
 
 
 def score_card(entry: Entry, rows: Sequence[Entry], *, n_ranked: int, gap: Gap | None) -> ScoreCard | None:
@@ -61,6 +62,15 @@ def score_card(entry: Entry, rows: Sequence[Entry], *, n_ranked: int, gap: Gap |
         gap=gap,
         strip=whiskers.strip(values, own=entry.value) if len(values) > 1 else NOTHING,
         strip_words=words,
+        ends=_ends([entry, *(row for row in others if row.value is not None)]),
+    )
+
+
+def _ends(rows: Sequence[Entry]) -> tuple[str, str]:
+    lowest, highest = (choose(rows, key=lambda row: row.value or 0.0) for choose in (min, max))
+    return (
+        format_rounded(lowest.value, decimals=lowest.decimals),
+        format_rounded(highest.value, decimals=highest.decimals),
     )
 
 

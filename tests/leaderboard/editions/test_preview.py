@@ -14,6 +14,7 @@ from leaderboard.models import (
     Edition,
     Status,
     Submission,
+    User,
 )
 from leaderboard.storage import truth_values
 from leaderboard.upkeep import backlog
@@ -52,6 +53,19 @@ def test_preview_says_what_becomes_rejected_and_why(entries: list[Submission], t
         assert change.new_status == Status.REJECTED
         assert change.problems[0]["message"].startswith("1 sequence has no value, added by a correction")
         assert change.rank_change > 0
+
+
+def test_what_is_rejected_in_both_editions_is_not_changed(
+    entries: list[Submission], owner: User, open_values: None
+) -> None:
+    builders.submit(owner, b'{"0": 3.5}', method="Incomplete")
+    builders.score_all()
+    second = open_edition(protocol="tsttc-2")
+    builders.score_all()
+    comparison = preview.preview(second)
+    assert (len(comparison.changes), len(comparison.entries)) == (5, 4)
+    # All get a warning error that the first protocol does not know.
+    assert preview.document(comparison)["n_changed"] == 4
 
 
 def test_counts_are_against_the_edition_that_is_named_whatever_was_the_board_at_import(

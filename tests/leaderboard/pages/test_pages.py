@@ -45,14 +45,14 @@ def test_the_privacy_page_names_the_longest_life_of_a_token(client: Client, benc
 
 
 def test_the_privacy_page_names_every_cookie_and_how_long_it_lives(client: Client, benchmark: None) -> None:
-    (table,) = (t for t in html.get(client, "/privacy/").all("table") if t.all("th")[0].text == "cookie")
+    (table,) = (t for t in html.get(client, "/privacy/").all("table") if t.all("th")[0].text == "Cookie")
     rows = [[td.text for td in tr.all("td")] for tr in table.one("tbody").all("tr")]
     cookies = {name: lifetime for name, _, lifetime in rows}
     ours = {known_settings.SESSION_COOKIE_NAME, known_settings.CSRF_COOKIE_NAME, shown_once.COOKIE}
     assert set(cookies) == {*ours, CookieStorage.cookie_name}
     assert cookies["sessionid"].startswith(f"{known_settings.SESSION_COOKIE_AGE // 86_400} days")
     assert pytest.approx(365 * 86_400, rel=0.01) == known_settings.CSRF_COOKIE_AGE
-    assert cookies["csrftoken"] == "one year"
+    assert cookies["csrftoken"] == "One year"
 
 
 def test_an_edited_page_is_shown_with_its_date_and_recorded(

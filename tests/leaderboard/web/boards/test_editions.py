@@ -58,12 +58,13 @@ def test_edition_names_its_ground_truth_protocol_counts_and_time(client: Client,
     assert shown["Manifest"] == truth.manifest_digest
     assert shown["Protocol"] == "tsttc-1"
     counts = truth.counts
-    assert shown["Sequences"] == (
-        f"120 in 24 recordings: crucial {counts['crucial']}, small {counts['small']}, "
+    assert shown["Sequences"] == "120 in 24 recordings"
+    assert shown["TTC ranges"] == (
+        f"crucial {counts['crucial']}, small {counts['small']}, "
         f"large {counts['large']}, negative {counts['negative']}, out of range {counts['out_of_range']}"
     )
     assert shown["Changed"] == "5 labels corrected, compared with edition 1"
-    assert shown["Published"].endswith("UTC: Labels corrected.")
+    assert shown["Published"].endswith("UTC: “Labels corrected.”")
 
 
 def test_edition_that_was_taken_back_says_so_and_keeps_its_board(client: Client, replaced: Edition) -> None:
@@ -73,7 +74,7 @@ def test_edition_that_was_taken_back_says_so_and_keeps_its_board(client: Client,
     assert pages.board_rows(root) == before
     assert "Rolled back to edition 1 on" in root.one("p", class_="notice").text
     assert ". “A mistake.”" in root.one("p", class_="notice").text
-    assert "again: A mistake." in facts(get(client, OLD))["Published"]
+    assert "again: “A mistake.”" in facts(get(client, OLD))["Published"]
 
 
 def test_edition_in_preparation_is_nothing_to_anybody(

@@ -28,10 +28,17 @@ def test_the_page_has_every_value_and_marks_the_defaults(client: Client) -> None
             [heading or "Name" for heading in shown.headings],
             *(list(row.cells) for row in shown.rows),
         ]
+    best = [[cell.text for cell in row.all("strong")] for row in tables[1].all("tr")[1:]]
+    assert [row[:2] for row in best if row] == [
+        ["13.5"],
+        ["14.3", "26.5"],
+        ["14.8", "27.6"],
+        ["15.6", "11.5"],
+    ]
     assert answer.text.count("(default)</span>") == sum(
         row.is_default for table in published_tables().tables for row in table.rows
     )
-    assert "15.5 fits" in answer.text
+    assert "15.5 is probably right" in answer.text
 
 
 def test_sweeps_have_a_chart_with_every_number_of_their_table() -> None:

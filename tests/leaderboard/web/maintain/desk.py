@@ -35,5 +35,6 @@ def refusal(client: Client, address: str, data: dict[str, object]) -> str:
     return assert_sound(response).one("div", class_="form-errors").text
 
 
-def totals(root: pages.Element) -> dict[str, str]:
-    return {div.one("dt").text: div.one("dd").text for div in root.one("dl", class_="totals").all("div")}
+def effects(root: pages.Element) -> list[str]:
+    """Return the sentences about what an edition does."""
+    return [item.text for item in root.one("ul", class_="consequences").all("li")]

@@ -22,7 +22,7 @@ from leaderboard.models import (
 )
 from tests import builders, pages
 from tests.editions import extended, open_edition, publish
-from tests.leaderboard.web.maintain.desk import FIRST, HUB, OPEN, SECOND, get, main_text, totals
+from tests.leaderboard.web.maintain.desk import FIRST, HUB, OPEN, SECOND, effects, get, main_text
 
 pytestmark = pytest.mark.slow
 
@@ -54,16 +54,18 @@ def test_every_page_is_sound(keeper: Client, rescored: Edition, address: str) ->
 
 def test_desk_shows_each_split_with_its_board_and_what_is_prepared(keeper: Client, second: Edition) -> None:
     root = get(keeper, HUB)
-    assert [h2.text for h2 in root.all("h2")] == ["Test", "Validation", "Demo"]
+    assert [h2.text for h2 in root.all("h2")] == ["Waiting for you", "Pages", "Editions"]
     # Django's administration shows nothing to a maintainer who is no superuser.
     assert "administration" in root.one("main").text
     User.objects.update(is_superuser=False)
     assert "administration" not in main_text(keeper, HUB)
-    test, val, _ = (section.text for section in root.all("section", class_="desk"))
-    assert "edition 1 published" in test
-    assert "Edition 2 draft since" in test
-    assert "0 %: 0 of 4." in test
-    assert "python manage.py import_truth val PATH" in val
+    test, val, _ = (row.text for row in root.one("table").one("tbody").all("tr"))
+    assert "edition 1, published" in test
+    draft = root.all("div", class_="preparing")[0].text
+    assert draft.startswith("Test, edition 2 draft since")
+    assert "0 %. 0 of 4 submissions finished." in draft
+    assert "none: no ground truth yet" in val
+    assert "python manage.py import_truth val PATH" in main_text(keeper, "/maintain/val/open/")
     bar = root.one("progress")
     assert (bar.attributes["value"], bar.attributes["max"]) == ("0", "4")
 
@@ -107,7 +109,7 @@ def test_progress_is_sent_when_it_changes_and_ends_with_the_comparison(
     last = poll(keeper, "?seen=0-4&comparison=1")
     assert last.status_code == 286
     root = pages.page(last)
-    assert "Finished: 4 of 4." in root.text
+    assert "Finished. 4 submissions: 4 scored." in root.text
     assert root.one("div", id="comparison").one("table", class_="changes")
 
 
@@ -117,22 +119,17 @@ def test_progress_is_sent_when_it_changes_and_ends_with_the_comparison(
 def test_comparison_is_the_previews_line_by_line(keeper: Client, rescored: Edition) -> None:
     expected = preview.preview(rescored)
     root = get(keeper, SECOND)
-    assert totals(root) == {
-        "sequences added": "0",
-        "sequences removed": "0",
-        "labels changed": "5",
-        "anno_id changed": "0",
-        "entries": "4",
-        "entries changed": str(expected.n_changed),
-        "ranks changed": str(expected.n_moved),
-        "newly rejected": "0",
-    }
+    assert (expected.n_changed, expected.n_moved) == (4, 1)
+    assert effects(root) == [
+        "Ground truth: 5 labels corrected.",
+        "MiD and RTE change for all 4 entries.",
+        "1 of 4 entries gets another rank.",
+    ]
     rows = root.one("table", class_="changes").one("tbody").all("tr")
     assert [row.one("th").one("a").text for row in rows] == [change.method for change in expected.changes]
     for row, change in zip(rows, expected.changes, strict=True):
         cells = row.all("td")
-        assert cells[-1].text == "scored"
-        for cell, name in zip(cells[1:-1], SCORE_NAMES, strict=True):
+        for cell, name in zip(cells[1:], SCORE_NAMES, strict=True):
             old, new, delta = change.old[name], change.new[name], change.delta[name]
             assert f"{old:.1f}" in cell.text
             assert f"{new:.1f}" in cell.text
@@ -145,18 +142,18 @@ def test_the_current_edition_shows_its_contents_who_published_it_and_its_changes
     keeper: Client, rescored: Edition
 ) -> None:
     first = main_text(keeper, FIRST)
-    assert "The first edition replaced no other." in first
+    assert "this is the first edition" in first
     assert "Publish" not in first.replace("Published", "")
     publish(rescored)
     root = get(keeper, SECOND)
-    assert totals(root)["labels changed"] == "5"
+    assert "Ground truth: 5 labels corrected." in effects(root)
     assert rescored.ground_truth.digest in root.text
-    assert re.search(r"UTC by (the command line|\S+@\S+): ", root.text)
-    assert "Changes from edition 1" in root.text
+    assert re.search(r"UTC (from the command line|by \S+@\S+): “", root.text)
+    assert "What this edition changed compared with edition 1" in root.text
     assert "Publish again" not in root.text
     assert preview.preview(rescored).replaces == 1
     former = main_text(keeper, FIRST)
-    assert "Changes from edition 2 if published again" in former
+    assert "What publishing it again would change compared with edition 2" in former
     assert "Publish again…" in former
 
 
@@ -166,7 +163,7 @@ def test_entries_that_become_rejected_say_why(
     open_edition(extended(tmp_path))
     builders.score_all()
     root = get(keeper, SECOND)
-    assert totals(root)["newly rejected"] == "4"
+    assert "4 scored entries become rejected." in effects(root)
     for row in root.one("table", class_="changes").one("tbody").all("tr"):
         status = row.one("td", class_="status")
         assert status.one("summary").text == (
@@ -176,10 +173,35 @@ def test_entries_that_become_rejected_say_why(
         assert status.text.startswith("rejected, was scored")
         assert "worse" in status.classes
     listed = main_text(keeper, f"{SECOND}publish/")
-    assert (
-        "4 scored entries cannot be scored in this edition, and stay marked in edition 1: M1.05 (Owls)"
-        in listed
-    )
+    assert "Edition 1 still shows what becomes rejected, marked: M1.05 (Owls)" in listed
+
+
+def test_a_protocol_that_lacks_a_metric_says_who_loses_it(
+    keeper: Client, owner: User, open_values: None, tmp_path: Path
+) -> None:
+    first = builders.import_truth(tmp_path, protocol="tsttc-2")
+    for factor in (1.05, 1.1):
+        builders.submit(owner, builders.predictions(first, factor=factor), method=f"M{factor}")
+    builders.submit(owner, b'{"0": 3.5}', method="Incomplete")
+    builders.score_all()
+    draft = open_edition(protocol="toolkit")
+    builders.score_all()
+    root = get(keeper, SECOND)
+    assert effects(root) == [
+        "The protocol toolkit replaces tsttc-2. It has no warning error (WE): all 2 entries lose this score.",
+        "MiD, RTE, all ranks and the ground truth stay the same.",
+    ]
+    assert effects(get(keeper, f"{SECOND}publish/"))[:2] == effects(root)
+    heads = [head.text for head in root.one("table", class_="changes").one("thead").all("th")]
+    assert heads[-1].endswith("not in toolkit")
+    publish(draft)
+    open_edition(protocol="tsttc-1")
+    assert effects(get(keeper, "/maintain/test/editions/3/")) == [
+        "The protocol tsttc-1 replaces toolkit.",
+        "The ground truth stays the same.",
+    ]
+    back = get(keeper, f"{SECOND}roll-back/")
+    assert "It adds the warning error (WE): all 2 entries get this score." in effects(back)[0]
 
 
 def test_csv_has_every_number_and_guards_texts(keeper: Client, rescored: Edition) -> None:

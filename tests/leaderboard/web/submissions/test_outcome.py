@@ -93,7 +93,7 @@ def test_what_may_be_the_best_is_marked_as_on_the_board(
         cell = root.one("div", class_="result").all("tr")[1].all("td")[0]
         assert "with-best" in cell.classes
         assert cell.text.endswith(", statistically tied for best in its column (95% confidence)")
-        assert "Grey: statistically tied" in root.one("main").text
+        assert "grey: tied for best at 95% confidence" in root.one("main").text
 
 
 # --- beside others ---------------------------------------------------------------------------------------
