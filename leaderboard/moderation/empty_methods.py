@@ -3,6 +3,7 @@
 from datetime import datetime
 
 from django.db import transaction
+from django.db.models import QuerySet
 
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused
@@ -16,8 +17,13 @@ def can_be_deleted(method: Method) -> bool:
     """Tell whether only its team has seen the method, and nothing of it was or can be scored."""
     if method.visibility != Visibility.PRIVATE or method.deleted_at is not None:
         return False
+    return not evaluations_that_keep(method).exists()
+
+
+def evaluations_that_keep(method: Method) -> QuerySet[Evaluation]:
+    """Return what was or can be scored; a withdrawn score counts, too."""
     others = Evaluation.objects.exclude(status__in=[Status.REJECTED, Status.CANCELLED])
-    return not others.filter(submission__method=method).exists()
+    return others.filter(submission__method=method)
 
 
 def delete(*, method: Method, actor: User, now: datetime) -> None:

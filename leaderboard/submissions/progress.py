@@ -56,7 +56,10 @@ def evaluation_of(submission: Submission) -> Evaluation:
 
 def _first_run(submission: Submission, speaking: Evaluation) -> Evaluation | None:
     first = min(submission.evaluations.all(), key=lambda each: each.edition.number)
-    return first if first.pk != speaking.pk and first.is_final else None
+    if first.pk == speaking.pk or first.finished_at is None:
+        return None
+    # A failed run may be retried after a later edition has scored the file; then it is not what came first.
+    return first if speaking.finished_at is None or first.finished_at <= speaking.finished_at else None
 
 
 def progress_of(submission: Submission) -> Progress:

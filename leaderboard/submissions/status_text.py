@@ -27,6 +27,15 @@ def sentence_of(evaluation: Evaluation) -> str:
     return ""
 
 
+def short_fault(message: str) -> str:
+    """Return the fault alone of a problem's message, without its places and what was expected.
+
+    >>> short_fault('1 key is not in the manifest: "zz"; expected its anno_ids.')
+    '1 key is not in the manifest'
+    """
+    return message.partition("; expected")[0].partition(": ")[0]
+
+
 def _of_system_error(evaluation: Evaluation, *, n_failed: int) -> str:
     counts = " Until then it counts as a rejected file for 24 hours." if evaluation.is_file_suspect else ""
     if evaluation.is_file_suspect and evaluation.n_poison_strikes < lifecycle.MAX_POISON_STRIKES:

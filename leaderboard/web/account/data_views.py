@@ -14,7 +14,7 @@ from leaderboard.errors.refusals import Refused
 from leaderboard.mails import notices
 from leaderboard.models import MailKind, User
 from leaderboard.moderation import forgetting
-from leaderboard.people import addresses
+from leaderboard.people import addresses, teams
 from leaderboard.quotas import mailboxes
 from leaderboard.quotas.spans import span
 from leaderboard.web.decorators import own_form, own_page
@@ -47,7 +47,9 @@ def data(request: HttpRequest) -> HttpResponse:
             form.require(user)
             return _forget(request)
     stays = span(mailboxes.longest_window()) if addresses.are_proved() else ""
-    context = {"form": form, "quota_stays": stays}
+    team = teams.current_team_of(user=user)
+    n_members = team.memberships.count() if team else 0
+    context = {"form": form, "quota_stays": stays, "n_members": n_members}
     return render(request, "account/data.html", context, status=422 if form.errors else 200)
 
 

@@ -50,8 +50,8 @@ class SignupNameForm(forms.Form):
 
 class NameForm(SiteForm):
     name = forms.CharField(
-        help_text="Shown on the boards once your team has a public method. It must not resemble "
-        "another team's name there. You can change the name once a day.",
+        help_text="Shown on the boards once your team has a public method. It must differ "
+        "clearly from the names of other teams there. You can change the name once a day.",
         widget=forms.TextInput(attrs={"maxlength": 80, "autocomplete": "organization"}),
         error_messages={"required": "The team has no name; expected one."},
     )

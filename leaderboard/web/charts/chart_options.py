@@ -21,7 +21,11 @@ Option = dict[str, Any]
 # Straight from 0 as long as the largest error is at most so many times the smallest.
 _MAX_STRAIGHT: Final = 6.0
 NARROW_PX: Final = 600
-_MAX_NAME_PX: Final = 260
+# Of a legend: px of its line, and of a name in it.
+_LEGEND_PX: Final = {"wide": (NARROW_PX, 480), "narrow": (348, 310), "narrowest": (290, 250)}
+# Where panels stand one above the other: their height in site.css by how many they are; what is above each.
+_STACKED_PX: Final = {2: 704, 3: 896}
+_HEAD_PX: Final = 50
 _LEFT_PX: Final = 44
 QUIET: Final = {"color": "--quiet", "fontSize": 11, "lineHeight": 14}
 TEXT: Final = {"color": "--ink", "fontSize": 12}
@@ -232,18 +236,25 @@ class Frame:
             **self.more,
         }
         narrow = {"maxWidth": max(NARROW_PX, NARROW_PX * n_panels // 2)}
-        media: list[Option] = [{"option": self._layout(n_panels, is_narrow=False)}]
-        media.append({"query": narrow, "option": self._layout(n_panels, is_narrow=True)})
-        # A legend has more lines in the narrowest windows.
-        media.append(
-            {"query": {"maxWidth": 350}, "option": self._layout(n_panels, is_narrow=True, legend_px=290)}
-        )
+        media: list[Option] = [
+            {"option": self._layout(n_panels, width="wide")},
+            {"query": narrow, "option": self._layout(n_panels, width="narrow")},
+            # A legend has more lines in the narrowest windows.
+            {"query": {"maxWidth": 350}, "option": self._layout(n_panels, width="narrowest")},
+        ]
         return {"baseOption": base, "media": media}
 
-    def _layout(self, n_panels: int, *, is_narrow: bool, legend_px: int = 348) -> Option:
+    def _layout(self, n_panels: int, *, width: str) -> Option:
+        is_narrow = width != "wide"
         left = self.left[is_narrow]
-        top = 38 + self.top + 24 * self._n_legend_lines(legend_px if is_narrow else NARROW_PX)
-        layout = {"legend": self._legend(), "grid": _grids(n_panels, left=left, top=top, is_narrow=is_narrow)}
+        line_px, name_px = _LEGEND_PX[width]
+        if not is_narrow:
+            line_px = max(line_px, NARROW_PX * n_panels // 2)
+        top = 38 + self.top + 24 * self._n_legend_lines(line_px, name_px)
+        layout = {
+            "legend": self._legend(name_px),
+            "grid": _grids(n_panels, left=left, top=top, is_narrow=is_narrow),
+        }
         if self.series_by_width[is_narrow]:
             layout["series"] = list(self.series_by_width[is_narrow])
         if n_panels > 1:  # one above the other, only the last has room for a name below it
@@ -258,17 +269,17 @@ class Frame:
             ]
         }
 
-    def _n_legend_lines(self, width_px: int) -> int:
+    def _n_legend_lines(self, width_px: int, name_px: int) -> int:
         # A little more than half an em for each letter.
         n_lines, used_px = 0, float(width_px)
         for name in self.names:
-            needed_px = 33 + min(_MAX_NAME_PX, 6.4 * len(name))
+            needed_px = 33 + min(name_px, 6.4 * len(name))
             if used_px + needed_px > width_px:
                 n_lines, used_px = n_lines + 1, 0.0
             used_px += needed_px
         return n_lines
 
-    def _legend(self) -> Option:
+    def _legend(self, name_px: int) -> Option:
         return {
             "show": bool(self.names),
             "data": list(self.names),
@@ -277,7 +288,7 @@ class Frame:
             "itemGap": 14,
             "itemWidth": 14,
             "itemHeight": 10,
-            "textStyle": {**TEXT, "width": _MAX_NAME_PX, "overflow": "truncate"},
+            "textStyle": {**TEXT, "width": name_px, "overflow": "truncate"},
             "inactiveColor": "--rule",
         }
 
@@ -287,7 +298,10 @@ def _grids(n_panels: int, *, left: int, top: int, is_narrow: bool) -> list[Optio
     before, after = ("top", "bottom") if is_narrow else ("left", "right")
     gap = 6 if is_narrow else 3  # per cent beside the border of two panels
     grids: list[Option] = [{**sides, "top": top} for _ in range(n_panels)]
+    # The legend takes its height from all panels, not from the first alone.
+    legend = 100 * (top - _HEAD_PX) / _STACKED_PX.get(n_panels, 896) if is_narrow else 0.0
     for number in range(1, n_panels):
-        grids[number - 1][after] = f"{100 * (n_panels - number) / n_panels + gap:.0f}%"
-        grids[number][before] = f"{100 * number / n_panels + gap:.0f}%"
+        border = legend + (100 - legend) * number / n_panels
+        grids[number - 1][after] = f"{100 - border + gap:.0f}%"
+        grids[number][before] = f"{border + gap:.0f}%"
     return grids

@@ -37,7 +37,9 @@ class MethodForm(DetailsForm):
 
     @classmethod
     def of_method(cls, request: HttpRequest, *, method: Method) -> "MethodForm":
-        return cls.asked(request, initial=_stated(method))
+        form = cls.asked(request, initial=_stated(method))
+        form.fields["description"].widget.attrs["rows"] = 14
+        return form
 
     def changes(self) -> dict[str, object]:
         """Return the posted fields; others stay as they are."""
@@ -77,7 +79,7 @@ class ShowForm(SiteForm):
         label="Becomes public on",
         required=False,
         error_messages={"invalid": "Enter a date such as 2027-03-01."},
-        help_text="Optional, a day in UTC.",
+        help_text="Optional, at 00:00 UTC. Without a day it stays anonymous until you make it public.",
         widget=forms.DateInput(attrs={"type": "date"}),
     )
     # The preview is a form, too, and asks for no tick.
@@ -94,7 +96,9 @@ class ShowForm(SiteForm):
             return cls(request.POST)
         chosen = request.GET.get("visibility", "")
         if chosen not in visibility.choices(method):
-            return cls(initial={"visibility": method.visibility, "reveal_on": _day(method.reveal_at)})
+            is_next_public = method.visibility == Visibility.ANONYMOUS and method.reveal_at is None
+            marked = Visibility.PUBLIC if is_next_public else method.visibility
+            return cls(initial={"visibility": marked, "reveal_on": _day(method.reveal_at)})
         return cls({"visibility": chosen, "reveal_on": request.GET.get("reveal_on", "")})
 
     def wanted(self) -> dict[str, Any]:

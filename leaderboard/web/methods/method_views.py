@@ -13,7 +13,7 @@ from leaderboard.boards import results, visibility_preview
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.http_caching import cacheable
 from leaderboard.methods import details, editing, visibility
-from leaderboard.models import Method, User, Visibility
+from leaderboard.models import Method, Status, Submission, User, Visibility
 from leaderboard.moderation import empty_methods
 from leaderboard.statistics import comparisons
 from leaderboard.submissions import search
@@ -90,7 +90,14 @@ def delete(request: HttpRequest, method_id: UUID) -> HttpResponse:
             empty_methods.delete(method=own, actor=cast("User", request.user), now=timezone.now())
             messages.success(request, f"{own.name} is deleted.")
             return redirect("submissions")
-    context = {"method": own, "form": form, "is_empty": empty_methods.can_be_deleted(own)}
+    kept_by = empty_methods.evaluations_that_keep(own)
+    context = {
+        "method": own,
+        "form": form,
+        "is_empty": empty_methods.can_be_deleted(own),
+        "n_scored": kept_by.filter(status=Status.SCORED).values("submission").distinct().count(),
+        "undecided": Submission.objects.filter(evaluations__in=kept_by).distinct().order_by("submitted_at"),
+    }
     return render(request, "methods/delete.html", context, status=422 if form.errors else 200)
 
 

@@ -17,6 +17,7 @@ from leaderboard.boards.rows import Entry, flat_scores
 from leaderboard.models import Edition, Evaluation, Status, Submission
 from leaderboard.statistics.comparisons import MIN_METHODS, Pair
 from leaderboard.submissions.progress import evaluation_of
+from leaderboard.submissions.status_text import short_fault
 from leaderboard.web.boards import whiskers
 from leaderboard.web.boards.score_columns import (
     Cell,
@@ -147,7 +148,8 @@ def submission_table(submissions: Iterable[Submission]) -> dict[str, Any]:
             for value in [values.get(name)]
         ]
         rows.append((submission, evaluation, cells, _reason(evaluation)))
-    return {"errors": errors, "rows": rows}
+    has_people = len({submission.submitted_by_id for submission, _ in evaluations}) > 1
+    return {"errors": errors, "rows": rows, "has_people": has_people}
 
 
 def _reason(evaluation: Evaluation) -> str:
@@ -156,7 +158,7 @@ def _reason(evaluation: Evaluation) -> str:
     if evaluation.status != Status.REJECTED or not evaluation.problems:
         return ""
     # The fault says enough here; its places, and what was expected, are on the submission's page.
-    message = evaluation.problems[0]["message"].partition("; expected")[0].partition(": ")[0]
+    message = short_fault(evaluation.problems[0]["message"])
     # Cut between words: the half of a number is another number.
     first = shorten(message, _MAX_REASON, placeholder=" …")
-    return f"{evaluation.n_problems:,} problems, the first: {first}" if evaluation.n_problems > 1 else first
+    return f"{evaluation.n_problems:,} problems; first: {first}" if evaluation.n_problems > 1 else first

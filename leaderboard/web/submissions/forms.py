@@ -51,7 +51,7 @@ class SubmissionForm(DetailsForm):
 
     split = forms.CharField(error_messages={"required": "No split was chosen; expected one of those listed."})
     method = forms.CharField(
-        help_text="Its name on the board: a new one, or that of one of your team's methods.",
+        help_text="Type a new name, or choose one of your team’s methods.",
         error_messages={"required": "No method was named; expected its name on the board."},
         widget=forms.TextInput(attrs={"list": "methods", "maxlength": 80, "autocomplete": "off"}),
     )

@@ -11,7 +11,7 @@ from django.utils.text import get_text_list
 from evaluator.counting import counted
 from evaluator.metrics.protocol import grouped_names, split_name
 from evaluator.scoring.results import format_rounded
-from leaderboard.boards.rows import Entry
+from leaderboard.boards.rows import ANONYMOUS_TEAM, Entry
 from leaderboard.exports import tables
 from leaderboard.models import Submission, Visibility
 from leaderboard.quotas.usage import Quota
@@ -56,6 +56,9 @@ def outcome_table(
     )
     # A private method has no rank that others could look up.
     quoted = replace(entry, rank=None) if board_position and board_position.is_supposed else entry
+    if entry.pseudonym:
+        # A paper under double-blind review must not name the team.
+        quoted = replace(quoted, method=entry.pseudonym, team=ANONYMOUS_TEAM)
     return {
         "table": result_table(entry, progress.counts),
         "card": card,
@@ -130,7 +133,7 @@ def rejected_sentence(quota: Quota | None) -> str:
 
     >>> from leaderboard.models import QuotaOverride
     >>> rejected_sentence(Quota("test", QuotaOverride(quota_rejected_limit=20), 0, 3, True, None, ""))[63:]
-    'You may have 17 more files rejected in the next 24 hours.'
+    '17 more rejected files are allowed in the next 24 hours.'
     """
     if quota is None:
         return "This file was not scored."
@@ -139,5 +142,5 @@ def rejected_sentence(quota: Quota | None) -> str:
     if limit is None:
         return cost
     n_left = max(0, limit - quota.n_rejected)
-    more = counted(n_left, "more file")
-    return f"{cost} You may have {more} rejected in the next 24 hours."
+    more = counted(n_left, "more rejected file")
+    return f"{cost} {more} {'is' if n_left == 1 else 'are'} allowed in the next 24 hours."

@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Final
+from typing import Final, NamedTuple
 
 from django.utils.text import get_text_list
 
 from leaderboard.models import Evaluation, Status
 from leaderboard.submissions.progress import Progress
+from leaderboard.submissions.status_text import short_fault
 from leaderboard.web.formatting import grouped
 
 MAX_POINTS: Final = 20
@@ -32,6 +33,20 @@ class Step:
     note: str = ""
 
 
+class ShownProblem(NamedTuple):
+    """A problem of a file: the fault in short, and the rest of its sentence."""
+
+    fault: str
+    rest: str
+    where: str
+    code: str
+
+    @property
+    def is_listed(self) -> bool:
+        """Tell whether the sentence names the places itself."""
+        return self.rest.startswith(": ")
+
+
 @dataclass(frozen=True)
 class StateLine:
     """The status line. `seen` changes with it; `is_moving` pages poll."""
@@ -40,7 +55,7 @@ class StateLine:
     seen: str
     is_moving: bool
     truncation: str
-    problems: tuple[Mapping[str, str], ...]
+    problems: tuple[ShownProblem, ...]
     listing: str
 
 
@@ -49,7 +64,7 @@ def state_line(
 ) -> StateLine:
     """Make the status line. `awaits_intervals`: scored, and its intervals are expected."""
     more = "-intervals" if awaits_intervals else ""
-    problems = tuple(progress.problems[:MAX_POINTS])
+    problems = tuple(_shown(problem) for problem in progress.problems[:MAX_POINTS])
     cut = f"; the first {MAX_POINTS} are listed" if len(progress.problems) > MAX_POINTS else ""
     is_whole = len(problems) == progress.n_problems
     return StateLine(
@@ -58,8 +73,14 @@ def state_line(
         is_moving=awaits_intervals or not progress.is_final,
         truncation=truncation(progress.truncated),
         problems=problems,
-        listing="" if is_whole else f"Identical problems are grouped{cut}.",
+        listing="" if is_whole else f"Problems of the same kind are listed together{cut}.",
     )
+
+
+def _shown(problem: Mapping[str, str]) -> ShownProblem:
+    message = problem["message"]
+    fault = short_fault(message)
+    return ShownProblem(fault, message[len(fault) :], problem.get("where", ""), problem.get("code", ""))
 
 
 def _with_withdrawal(shown: tuple[Step, ...], at: datetime | None) -> tuple[Step, ...]:
@@ -111,13 +132,13 @@ def truncation(truncated: Mapping[str, int]) -> str:
     """Say how many predictions were truncated at each boundary.
 
     >>> truncation({"-20": 0, "0.05": 1, "20": 1200})
-    '1,201 predictions lay outside the allowed range and were truncated: 1 at 0.05 s and 1,200 at 20 s.'
+    '1,201 predictions lay outside the allowed range and were truncated: 1 to 0.05 s and 1,200 to 20 s.'
     """
     moved = {boundary: n for boundary, n in truncated.items() if n}
     n_moved = sum(moved.values())
     if not moved:
         return "Nothing was truncated."
-    parts = [f"{grouped(n)} at {boundary.replace('-', '−')} s" for boundary, n in moved.items()]
+    parts = [f"{grouped(n)} to {boundary.replace('-', '−')} s" for boundary, n in moved.items()]
     subject = "1 prediction" if n_moved == 1 else f"{grouped(n_moved)} predictions"
     verb = "was" if n_moved == 1 else "were"
     return f"{subject} lay outside the allowed range and {verb} truncated: {get_text_list(parts, 'and')}."

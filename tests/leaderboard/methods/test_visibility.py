@@ -193,6 +193,14 @@ def test_an_anonymous_method_offers_to_be_made_public(
         words = [a.text for a in pages.get(client, address).one("main").all("a")]
         assert "Make public…" in words
         assert "Publish…" not in words
+    page = pages.get(client, f"/methods/{method.pk}/visibility/")
+    assert page.one("main").one("h1").text == "Make Secret sauce public"
+    (marked,) = [radio for radio in page.all("input", type="radio") if "checked" in radio.attributes]
+    assert marked.attributes["value"] == "PUBLIC"
+    change(method, "ANONYMOUS", owner, reveal_at=timezone.now() + timedelta(days=9))
+    page = pages.get(client, f"/methods/{method.pk}/visibility/")
+    (marked,) = [radio for radio in page.all("input", type="radio") if "checked" in radio.attributes]
+    assert marked.attributes["value"] == "ANONYMOUS"
 
 
 # --- the page ----------------------------------------------------------------------------------------------
@@ -227,7 +235,7 @@ def test_page_shows_what_others_will_see_asks_and_shows_it(
     assert "Secret sauce is now public." in pages.page(response).one("main").text
     assert Method.objects.get().visibility == Visibility.PUBLIC
     left = pages.page(client.get(address)).one("main")
-    assert "Public: everyone sees the method, permanently." in left.text
+    assert "Everyone sees the method. It cannot become anonymous or private again." in left.text
     assert left.all("form") == []
 
 

@@ -10,6 +10,7 @@ from leaderboard.models import AuditEvent, Edition, Method, Submission, User
 from leaderboard.moderation import empty_methods
 from leaderboard.people import invitations, teams
 from leaderboard.quotas import usage
+from leaderboard.submissions import intake
 from tests import builders, pages
 
 
@@ -60,16 +61,34 @@ def test_what_has_a_score_waits_or_was_shown_stays(
     assert Method.objects.existing().count() == Method.objects.count() == 2
 
 
-def test_what_cannot_be_deleted_leads_to_withdrawing(
+def test_what_cannot_be_deleted_says_what_keeps_it_and_leads_to_withdrawing(
     signed_in: Client, edition: Edition, owner: User
 ) -> None:
     sent = builders.submit(owner, builders.predictions(edition), method="Scored", visibility="PRIVATE")
+    address = f"/methods/{sent.method_id}/delete/"
+    main = pages.get(signed_in, address).one("main")
+    assert "1 submission of it has no result yet" in main.text
+    assert f"/submissions/{sent.pk}/" in [a.attributes["href"] for a in main.all("a")]
     builders.score_all()
-    address = f"/methods/{sent.method_id}/"
-    (link,) = [a for a in pages.get(signed_in, address).one("main").all("a") if a.text == "Delete…"]
+    (link,) = [a for a in pages.get(signed_in, address[:-7]).one("main").all("a") if a.text == "Delete…"]
     main = pages.get(signed_in, link.attributes["href"]).one("main")
+    assert main.one("h1").text == "Scored cannot be deleted"
+    assert "It has 1 scored submission." in main.text
     (link,) = [a for a in main.all("a") if a.text == "withdraw its submissions"]
     assert link.attributes["href"] == f"/submissions/?method={sent.method_id}"
+    intake.withdraw(submission=sent, actor=owner, now=timezone.now())
+    assert not empty_methods.can_be_deleted(sent.method), "as the page says"
+    builders.submit(owner, builders.predictions(edition), method="Shown", visibility="PUBLIC")
+    shown = Method.objects.get(name="Shown")
+    main = pages.get(signed_in, f"/methods/{shown.pk}/delete/").one("main")
+    assert "The method is public: everyone has seen it" in main.text
+
+
+def test_a_cancelled_submission_no_longer_keeps_its_method(edition: Edition, owner: User) -> None:
+    sent = builders.submit(owner, builders.predictions(edition), method="Waiting", visibility="PRIVATE")
+    assert not empty_methods.can_be_deleted(sent.method)
+    intake.withdraw(submission=sent, actor=owner, now=timezone.now())
+    assert empty_methods.can_be_deleted(sent.method)
 
 
 def test_a_deleted_method_comes_along_to_another_team_and_takes_no_name(

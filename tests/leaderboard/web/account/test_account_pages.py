@@ -40,13 +40,15 @@ def test_sign_up_tells_of_all_that_is_wrong_at_once_and_of_each_rule_once(client
 def test_account_begins_with_what_it_has_and_leads_to_each_part(signed_in: Client, owner: User) -> None:
     builders.token(owner)
     root = pages.get(signed_in, "/account/")
-    tiles = {
-        li.one("a").text: (li.one("strong").text, li.one("a").attributes["href"]) for li in root.all("li")
+    parts = {
+        link.text: (row.all("td")[0].text, link.attributes["href"])
+        for row in root.one("tbody").all("tr")
+        for link in row.all("a")
     }
-    assert tiles["Email"][0] == owner.email
-    assert tiles["API tokens"] == ("1", "/tokens/")
-    assert tiles["Two-factor"][0] == "off"
-    assert all(signed_in.get(address).status_code == 200 for _, address in tiles.values())
+    assert parts["Email"][0] == owner.email
+    assert parts["API tokens"] == ("1 in use", "/tokens/")
+    assert parts["Two-factor"][0] == "off"
+    assert all(signed_in.get(address).status_code == 200 for _, address in parts.values())
 
 
 def test_page_of_addresses_offers_only_what_applies(signed_in: Client, owner: User) -> None:

@@ -159,6 +159,17 @@ def test_latex_row_is_that_of_the_boards_table(signed_in: Client, inferred: list
     assert " & M1.1 & Owls & " in row
 
 
+def test_latex_row_of_an_anonymous_method_names_neither_it_nor_its_team(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
+    sent = builders.submit(owner, builders.predictions(edition), method="Secret Net", visibility="ANONYMOUS")
+    builders.score_all()
+    row = look(signed_in, sent).one("code", id="latex-row").raw_text
+    assert f" & {sent.method.pseudonym} & Anonymous & " in row
+    assert "Secret" not in row
+    assert sent.method.team.name not in row
+
+
 def test_score_is_quoted_in_one_line_and_no_interval_breaks(
     signed_in: Client, inferred: list[Submission]
 ) -> None:
@@ -178,7 +189,7 @@ def test_score_is_quoted_in_one_line_and_no_interval_breaks(
 
 
 @pytest.mark.parametrize(
-    ("limit", "left"), [(20, ". You may have 19 more files rejected in the next 24 hours."), (None, ".")]
+    ("limit", "left"), [(20, ". 19 more rejected files are allowed in the next 24 hours."), (None, ".")]
 )
 def test_rejected_file_uses_no_quota_and_page_says_how_many_more_are_taken(
     signed_in: Client, edition: Edition, owner: User, limit: int | None, left: str

@@ -203,6 +203,12 @@ def test_of_a_re_scored_submission_both_runs_are_shown_with_their_dates(
     assert all(step.one("time").text.endswith(" UTC") for step in steps)
     assert steps[1].text.endswith("edition 1")
     assert "edition 2" in steps[2].text
+    # The run in the first edition had failed, and was retried only now.
+    Evaluation.objects.exclude(edition=second).update(finished_at=again_at + timedelta(minutes=1))
+    steps = get(signed_in, PAGE, submission).one("ol", class_="steps").all("li")
+    times = [step.one("time").text for step in steps]
+    assert times == sorted(times)
+    assert [step.one("span", class_="label").text for step in steps][-1] == "Scored"
 
 
 def test_after_the_score_the_next_steps_are_buttons(signed_in: Client, edition: Edition, owner: User) -> None:

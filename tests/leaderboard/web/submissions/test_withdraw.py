@@ -108,6 +108,7 @@ def test_page_says_what_withdrawing_does_and_that_it_stays_done(signed_in: Clien
     root = assert_sound(signed_in.get(link.attributes["href"]))
     assert "I know that this cannot be undone." in root.one("main").text
     assert "removed from the current board and from all earlier editions" in root.one("main").text
+    assert "It is the method’s only scored submission to Test. The row stays" in root.one("main").text
     assert root.one("main").one("button").text == "Withdraw"
     sent.refresh_from_db()
     assert sent.withdrawn_at is None
