@@ -213,8 +213,8 @@ def floor_sentence(floor: Mapping[str, float | None] | None, *, decimals: int = 
 
     >>> print(floor_sentence({"mid": 0.36, "mid_crucial": 0.0, "rte": 0.73, "rte_crucial": 0.02}))
     Floor: the ground truth itself, submitted as predictions, scores MiD 0.36, RTE 0.73 %, RTE on crucial \
-0.02 % and 0 in every other column. Hardly any file can score lower, because the protocol truncates \
-predictions and not the ground truth.
+0.02 % and 0 in every other column. This is about the lowest possible score: the protocol \
+truncates predictions, but not the ground truth.
     """
     if not floor or not any(floor.values()):
         return ""
@@ -224,6 +224,6 @@ predictions and not the ground truth.
     parts = [f"{column_words(name)} {text}{metric_of(name).unit_of_value}" for name, text in texts.items()]
     rest = " and 0 in every other column" if len(shown) < len(values) else ""
     return (
-        f"Floor: the ground truth itself, submitted as predictions, scores {', '.join(parts)}{rest}. Hardly "
-        "any file can score lower, because the protocol truncates predictions and not the ground truth."
+        f"Floor: the ground truth itself, submitted as predictions, scores {', '.join(parts)}{rest}. This is "
+        "about the lowest possible score: the protocol truncates predictions, but not the ground truth."
     )

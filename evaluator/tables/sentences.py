@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Final
 
-from evaluator.counting import counted
 from evaluator.metrics.protocol import column_words, metric_of
 from evaluator.scoring.significance import LEAST_P, SIGNIFICANT, Difference, best_of, too_few_units
 from evaluator.units import in_words
@@ -160,28 +159,16 @@ than it is by about 0.60 and 1.09 standard errors of the difference of two of th
     )
 
 
-def resolution(pairs: Sequence[Mapping[str, Difference]], *, decimals: int = 2) -> str:
-    """Describe each column's resolution by the differences of neighbours on a board; empty without any.
+def resolutions(pairs: Sequence[Mapping[str, Difference]]) -> dict[str, float]:
+    """Return each column's resolution: the median of those of neighbours on a board.
 
     >>> some = [{"mid": Difference(-1, -2, 0, 0.1), "rte": Difference(-1, -1.5, -0.5, 0.01)}]
-    >>> print(resolution(some))
-    Resolution: neighbouring methods are told apart, with about 80% power, if they differ by MiD 1.43, RTE \
-0.71 percentage points (medians of 1 pair).
+    >>> {name: round(value, 2) for name, value in resolutions(some).items()}
+    {'mid': 1.43, 'rte': 0.71}
     """
     names = dict.fromkeys(name for pair in pairs for name in pair)
     known = {name: [r for pair in pairs if name in pair and (r := pair[name].resolution)] for name in names}
-    parts = [
-        f"{column_words(name)} {median(values):.{decimals}f}{metric_of(name).unit_of_difference}"
-        for name, values in known.items()
-        if values
-    ]
-    if not parts:
-        return ""
-    n = max(map(len, known.values()))
-    return (
-        f"Resolution: neighbouring methods are told apart, with about 80% power, if they differ by "
-        f"{', '.join(parts)} (medians of {counted(n, 'pair')})."
-    )
+    return {name: median(values) for name, values in known.items() if values}
 
 
 def others(differences: Mapping[str, Difference], *, primary: str) -> str:

@@ -1,6 +1,7 @@
-"""How far ranks have moved in a month, on boards of one edition: since the end of a day, read once a day."""
+"""How far ranks have moved in a month, read once a day, and what has changed on a board since a time."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime, time, timedelta
 from typing import Final
 from uuid import UUID
@@ -9,6 +10,7 @@ from django.core.cache import caches
 
 from leaderboard.boards import listing
 from leaderboard.boards.listing import Board
+from leaderboard.boards.rows import Entry
 
 MONTH: Final = timedelta(days=30)
 
@@ -46,3 +48,32 @@ def _ranks_before(board: Board, *, at: datetime) -> dict[UUID, int]:
 
     key = f"ranks:{split.pk}:{edition.pk}:{at.isoformat()}"
     return caches["boards"].get_or_set(key, ranks, _A_DAY_S) or {}
+
+
+@dataclass(frozen=True)
+class Change:
+    """One row on two boards; None on the one that does not have it."""
+
+    before: Entry | None
+    after: Entry | None
+
+    @property
+    def entry(self) -> Entry:
+        """Return the row as it is now, or as it was last."""
+        return self.after or self.before  # type: ignore[return-value]  # one of them is there
+
+
+def changes(before: Sequence[Entry], after: Sequence[Entry]) -> list[Change]:
+    """Return the rows that are new, gone or withdrawn, or have another rank or value, by their rank now."""
+    former, present = ({entry.id: entry for entry in rows} for rows in (before, after))
+    pairs = [Change(former.get(key), present.get(key)) for key in present | former]
+    changed = [pair for pair in pairs if _state(pair.before) != _state(pair.after)]
+    return sorted(changed, key=lambda pair: (pair.after is None, _order(pair.entry)))
+
+
+def _state(entry: Entry | None) -> tuple[object, ...] | None:
+    return (entry.rank, entry.value, entry.withdrawn_at) if entry else None
+
+
+def _order(entry: Entry) -> tuple[bool, int, str]:
+    return entry.rank is None, entry.rank or 0, entry.method.casefold()

@@ -25,9 +25,10 @@ _MAX_PAGE_DIGITS: Final = 6
 class BadView(ValueError):
     """A query with impossible columns or page. `field` is the parameter's name."""
 
-    def __init__(self, field: str, sentence: str) -> None:
+    def __init__(self, field: str, sentence: str, *, on_page: str = "") -> None:
         super().__init__(sentence)
         self.field = field
+        self.on_page = on_page or sentence
 
 
 # What is wrong with an address; each is a sentence for the reader.
@@ -62,14 +63,19 @@ class BoardQuery:
 def forgiving(
     query: Mapping[str, str], *, now: datetime, has_time: bool = True
 ) -> tuple[BoardQuery, dict[str, str]]:
-    """Parse a query without its faults; return a sentence for each of them as well."""
+    """Parse a query without its faults; return a sentence for a visitor on each of them as well."""
     left, faults = {name: query[name] for name in query}, dict[str, str]()
     while True:
         try:
             return parse(left, now=now, has_time=has_time), faults
         except FAULTS as fault:
-            faults[fault.field] = str(fault)
+            faults[fault.field] = on_page(fault)
             del left[fault.field]
+
+
+def on_page(fault: Exception) -> str:
+    """Say what is wrong with an address, to a person; programs get the whole list of what is right."""
+    return getattr(fault, "on_page", str(fault))
 
 
 def parse(query: Mapping[str, str], *, now: datetime, has_time: bool = True) -> BoardQuery:
@@ -97,7 +103,9 @@ def _columns(text: str) -> str:
     known = (ALL_COLUMNS, *known_metrics())
     if text not in known:
         raise BadView(
-            "columns", f"The board has no columns {text[:60]!r}; expected one of {', '.join(known)}."
+            "columns",
+            f"The board has no columns {text[:60]!r}; expected one of {', '.join(known)}.",
+            on_page=f"This address asks for unknown columns, “{text[:60]}”. The board shows all columns.",
         )
     return text
 

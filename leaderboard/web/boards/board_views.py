@@ -1,6 +1,7 @@
 """Pages of a board, now, as of a time, or of one edition, and the list of editions."""
 
 from dataclasses import replace
+from datetime import date, datetime, timedelta
 from typing import Any
 
 from django.http import HttpRequest, HttpResponse
@@ -13,9 +14,10 @@ from leaderboard.boards import snapshots
 from leaderboard.boards.listing import Board, UnknownColumn
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.editions import history
-from leaderboard.models import Edition, Split
+from leaderboard.models import Edition, Publication, Split
 from leaderboard.quotas import admissions
 from leaderboard.web.boards import board_query, edition_tables, export_views, tables
+from leaderboard.web.boards.board_changes import changed_rows
 from leaderboard.web.boards.board_query import BoardQuery, tools
 from leaderboard.web.boards.rank_ladder import rank_ladder
 from leaderboard.web.charts import chart_views
@@ -50,9 +52,12 @@ def render_board(
             query,
             asked=request.GET,
             faults=faults,
-            latest_day=now.date() if edition is None and split.current_edition else None,
+            # Today has not ended yet: it is the present board.
+            latest_day=_yesterday(now) if edition is None and split.current_edition else None,
         ),
         "ladder": ladder,
+        "changes": changed_rows(shown),
+        "first_publication": _first_publication(shown),
         "exports": export_views.offers(shown, edition, query),
         # Where one can submit instead, and the chart below: of the present board alone.
         "open_splits": []
@@ -84,10 +89,19 @@ def _shown(
             filters=query.filters,
         )
     except UnknownColumn as fault:
-        faults[fault.field] = str(fault)
+        faults[fault.field] = board_query.on_page(fault)
         given = {name: text for name, text in query.given.items() if name != fault.field}
         return _shown(request, split, edition, replace(query, sort="rank", given=given), faults)
     return board, query
+
+
+def _yesterday(now: datetime) -> date:
+    return (now - timedelta(days=1)).date()
+
+
+def _first_publication(board: Board) -> Publication | None:
+    """Return when a split first had a board, where there was none yet at the time that is asked for."""
+    return None if board.edition or not board.at else history.changelog(board.split).last()
 
 
 @require_safe
@@ -95,9 +109,8 @@ def editions(request: HttpRequest, split: str) -> HttpResponse:
     split_row = split_or_404(request, split)
     log = history.changelog(split_row)
     rows = [(past, edition_tables.past_change(past)) for past in history.history(split_row, log)]
-    return render(
-        request, "boards/editions/editions.html", {"split": split_row, "rows": rows, "changelog": log}
-    )
+    context = {"split": split_row, "rows": rows, "changelog": log, "latest_day": _yesterday(timezone.now())}
+    return render(request, "boards/editions/editions.html", context)
 
 
 @require_safe

@@ -62,7 +62,7 @@ def news(split: Split) -> str:
 
 
 def past_change(past: history.EditionRecord) -> str:
-    return _change_words(past.change, past.followed, past.edition) if past.followed else "the first"
+    return _change_words(past.change, past.followed, past.edition) if past.followed else "first edition"
 
 
 def rescored_notice(rescored: history.Rescored | None) -> dict[str, Any] | None:

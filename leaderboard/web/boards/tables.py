@@ -99,6 +99,7 @@ class BoardTable:
     pages: "Page[Entry]"
     has_intervals: bool
     has_one_whisker: bool  # in a column of its own before all numbers
+    is_log: bool  # whether every whisker is on a logarithmic scale
     can_compare: bool
     reason: str  # why there are no intervals; empty where there are
     floor: str  # what the ground truth itself scores, in words; empty where that is not known
@@ -107,6 +108,15 @@ class BoardTable:
     def is_narrow(self) -> bool:
         """Tell whether its few columns leave a wide page empty."""
         return len(self.score_headings) + sum(bool(each.axis) for each in self.score_headings) <= 7
+
+    @property
+    def has_rank_ranges(self) -> bool:
+        return any(each.rank_low is not None for row in self.rows for each in row.entry.intervals.values())
+
+    @property
+    def has_attempts(self) -> bool:
+        """Tell whether rows have room for their numbers of submissions, and have any."""
+        return len(self.groups) == N_WHOLE_METRICS and any(row.attempts for row in self.rows)
 
     @property
     def has_private_rows(self) -> bool:
@@ -161,6 +171,7 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
         range_choices=_range_choices(names, query),
         groups=score_groups(names, n_whiskers=len(scales) if is_of_one else 0),
         has_one_whisker=bool(scales) and not is_of_one,
+        is_log=bool(scales) and all(scale.is_log for scale in scales.values()),
         score_headings=tuple(
             score_heading(name, query, scales.get(name), primary=board.rules.primary.name) for name in names
         ),

@@ -15,10 +15,12 @@ from leaderboard.boards.rows import Entry
 from leaderboard.boards.snapshots import Attempt
 from leaderboard.exports.tables import team_of
 from leaderboard.web.charts.chart_options import (
+    TEXT,
     Chart,
     Frame,
     Mark,
     Option,
+    call,
     empty,
     error_axis,
     error_text,
@@ -39,6 +41,8 @@ MAX_BEHIND: Final = 500
 MIN_DATES: Final = 3
 # Fewer have no front worth a drawing.
 _MIN_LATENCIES: Final = 3
+# Up to so many points have room for a name each.
+_FEW_POINTS: Final = 5
 
 
 # --- a front and what lies behind it ---------------------------------------------------------------------
@@ -90,14 +94,18 @@ def _front_series(
     """Return the series of submissions and of published results, and the legend's names."""
     front = [each for each in points if each.is_front]
     series = [staircase(line, [*((each.x, each.y) for each in front), (end, front[-1].y)])]
-    names = [line]
+    # A front of one point is no line.
+    names = [line] if len(front) > 1 else []
     for kind, name, symbol in (("submission", SUBMITTED, "circle"), ("published", QUOTED, "diamond")):
         of_kind = [each for each in points if each.entry.kind == kind]
         if not of_kind:
             continue
         names.append(name)
         behind = [each.mark("", metric) for each in of_kind if not each.is_front]
-        series.append(marks(name, behind, Look("--quiet", symbol, 9.0, is_hollow=True)))
+        drawn_behind = marks(name, behind, Look("--quiet", symbol, 9.0, is_hollow=True))
+        if len(points) <= _FEW_POINTS:
+            drawn_behind["label"] = {**TEXT, "show": True, "position": "top", "formatter": call("name")}
+        series.append(drawn_behind)
         ahead = [i for i, each in enumerate(front) if each.entry.kind == kind]
         drawn = [each.mark(praise, metric) for each in front]
         series.append(named_marks(name, drawn, ahead, Look("--s1", symbol, 11.0)))

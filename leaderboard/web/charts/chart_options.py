@@ -26,6 +26,7 @@ _LEGEND_PX: Final = {"wide": (NARROW_PX, 480), "narrow": (348, 310), "narrowest"
 # Where panels stand one above the other: their height in site.css by how many they are; what is above each.
 _STACKED_PX: Final = {2: 704, 3: 896}
 _HEAD_PX: Final = 50
+_BETWEEN: Final = (1.2, 1.5, 3, 4, 6, 8)
 _LEFT_PX: Final = 44
 QUIET: Final = {"color": "--quiet", "fontSize": 11, "lineHeight": 14}
 TEXT: Final = {"color": "--ink", "fontSize": 12}
@@ -118,6 +119,9 @@ def log_axis(values: Iterable[float], *, room: float = 0.0) -> Option:
     while room and math.log(min(known) / low) < room * math.log(high / low):
         low, _ = round_range(0.9 * low, high)
     within = [step for step in _round_numbers(low, high) if low <= step <= high]
+    if len(within) == 2:  # two names at the ends leave the middle without any
+        within = sorted({*within, *(factor * 10 ** math.floor(math.log10(low)) for factor in _BETWEEN)})
+        within = [step for step in within if low <= step <= high]
     if len(within) > 10:  # several decades: their beginnings are enough
         within = [step for step in within if math.log10(step) % 1 < 1e-9]
     ticks = {"customValues": within}

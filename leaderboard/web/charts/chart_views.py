@@ -9,6 +9,8 @@ from django.shortcuts import render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
+from evaluator.metrics.protocol import OVERALL, grouped_names, range_of
+from evaluator.scoring.results import format_rounded
 from evaluator.tables import sentences
 from leaderboard.boards import snapshots
 from leaderboard.boards.listing import Board
@@ -49,12 +51,23 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
         # A map of empty cells says less than a sentence.
         "is_early": 2 * n_waiting > len(pairs),
         "n_first": comparisons.N_FIRST if len(pairs) == math.comb(comparisons.N_FIRST, 2) else 0,
-        "resolution": sentences.resolution(
-            [pair.differences or {} for pair in comparisons.neighbours(pairs)],
-            decimals=board.edition.decimals if board.edition else 2,
-        ),
+        "resolution": _resolution(board, pairs),
+        "alike": significance_chart.alike_words(pairs),
     }
     return render(request, "charts/charts.html", context)
+
+
+def _resolution(board: Board, pairs: Sequence[Pair]) -> list[tuple[str, list[str]]]:
+    """Return by TTC range the smallest difference that the board can detect, in each metric."""
+    known = sentences.resolutions([pair.differences or {} for pair in comparisons.neighbours(pairs)])
+    decimals = board.edition.decimals if board.edition else 2
+    rows: dict[str, list[str]] = {}
+    for names in grouped_names(board.rules.score_names).values():
+        for name in names:
+            ttc_range = range_of(name)
+            cells = rows.setdefault(ttc_range.seconds if ttc_range else OVERALL, [])
+            cells.append(format_rounded(known.get(name), decimals=decimals))
+    return list(rows.items()) if known else []
 
 
 @require_safe

@@ -8,6 +8,7 @@ from urllib.parse import urlencode
 from django.urls import reverse
 
 from evaluator import Difference
+from evaluator.counting import counted
 from evaluator.metrics.protocol import metric_of
 from evaluator.metrics.registry import Metric
 from evaluator.tables.sentences import p_cell
@@ -19,6 +20,7 @@ from leaderboard.web.charts.chart_series import cells
 from leaderboard.web.formatting import signed
 
 _FEW, _FEW_ON_A_PHONE = 8, 7
+_MAX_NAMED: Final = 3
 SIGNIFICANT: Final = {0.001: "p < 0.001", 0.01: "p < 0.01", 0.05: "p < 0.05"}
 UNDECIDED, COMPUTING = "not significant", "computing…"
 ANONYMOUS, UNTESTED = "no test (anonymous)", "no test"
@@ -112,6 +114,24 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
         numbers=(2, 4),
         is_low=len(entries) <= _FEW,
     )
+
+
+def alike_words(pairs: Sequence[Pair]) -> str:
+    """Say which tested pairs do not differ significantly; empty without a tested pair."""
+    tested = [pair for pair in pairs if pair.difference and pair.difference.p_below is not None]
+    alike = [pair for pair in tested if not pair.difference.is_significant]  # type: ignore[union-attr]  # tested
+    if not tested:
+        return ""
+    if not alike:
+        return "All tested pairs differ significantly (p\u00a0<\u00a00.05)."
+    if len(alike) > _MAX_NAMED:
+        n_tested = counted(len(tested), "tested pair")
+        return f"{len(alike)} of {n_tested} do not differ significantly (p\u00a0≥\u00a00.05)."
+    named = [
+        " and ".join(f"{entry.method} (rank {entry.rank})" for entry in (pair.first, pair.second))
+        for pair in alike
+    ]
+    return f"All tested pairs differ significantly (p\u00a0<\u00a00.05), except {'; '.join(named)}."
 
 
 def _series(name: str, pair_cells: Sequence[_Cell]) -> Option:

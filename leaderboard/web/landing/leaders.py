@@ -42,7 +42,7 @@ def lead_words(board: Board) -> str:
     (leader,) = first
     interval = leader.interval
     if interval.rank_low is None or interval.rank_high is None:
-        return f"Whether the lead is significant is not known: {_why_unknown(board, leader)}"
+        return f"We cannot tell whether the lead is significant: {_why_unknown(board, leader)}"
     if interval.rank_high == 1:
         return f"The lead of {leader.method} is significant (95% confidence)."
     also = [e.method for e in ranked[1:] if e.interval.rank_low == 1]

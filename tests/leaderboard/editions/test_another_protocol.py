@@ -101,14 +101,16 @@ def test_a_further_range_and_a_third_metric_stand_wherever_their_edition_is_show
     assert all(value is not None for row in scored for value in row["scores"].values())
     assert all(row["scores"][name] is None for row in board["entries"] if row not in scored for name in NEW)
     page = page_text(client, "/board/test/")
-    assert "Absolute TTC error (AE): overall only; the button AE above shows its TTC ranges." in page
+    words = "Absolute TTC error (AE): the table shows only the overall value. Press AE above"
+    assert words in page
     assert "20–60 s" in page
     # So many columns as fit on a screen; all of them where the metric is chosen.
     heads = pages.page(client.get("/board/test/")).one("table", class_="board").all("th", scope="col")
     assert [head.text for head in heads if "AE" in head.text] == ["AEAE, overall, soverall"]
     assert "Absolute TTC error (AE) s" in page_text(client, "/board/test/?columns=absolute")
     assert "AE" in page_text(client, "/board/test/?sort=-absolute_far&columns=absolute")
-    assert "cannot be sorted by 'absolute'" in page_text(client, "/board/test/editions/1/?sort=absolute", 400)
+    unsorted = page_text(client, "/board/test/editions/1/?sort=absolute", 400)
+    assert "This board has no column “absolute” to sort by." in unsorted
 
     # Comparison and charts.
     ids = [row["method_id"] for row in scored[:2]]

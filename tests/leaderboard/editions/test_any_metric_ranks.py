@@ -104,7 +104,7 @@ def test_counts_follow_the_protocol_of_the_edition(board: Edition, client: Clien
     n = board.ground_truth.n_sequences
     counts = board.ground_truth.counts
     assert board.n_out_of_range == n - counts["approaching"] - counts["leaving"] != counts["out_of_range"]
-    assert f"out of range {board.n_out_of_range}" in client.get("/board/test/editions/1/").content.decode()
+    assert f"{board.n_out_of_range} out of range" in client.get("/board/test/editions/1/").content.decode()
     answer = client_of(User.objects.get(email="owner@example.org")).get("/api/v1/submissions").json()
     assert answer[0]["n_out_of_range"] == board.n_out_of_range
 

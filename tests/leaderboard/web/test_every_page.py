@@ -173,7 +173,7 @@ def test_a_page_of_a_fault_leads_back_to_where_one_was_with_its_filters(
     client: Client, benchmark: None, settings: Settings, referer: str, back: list[str]
 ) -> None:
     settings.SITE_URL = "https://board.example.org"
-    boards = ["/board/test/", "/board/val/", "/board/demo/"]
+    boards = ["/", "/board/test/", "/board/val/", "/board/demo/"]
     main = pages.get(client, "/nowhere/", 404).one("main")
     assert [a.attributes["href"] for a in main.all("a")] == boards
     root = assert_sound(client.get("/nowhere/", headers={"Referer": referer}))

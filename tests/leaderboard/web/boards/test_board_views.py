@@ -7,7 +7,6 @@ import pytest
 from django.test import Client
 
 from evaluator import SCORE_NAMES
-from evaluator.metrics.protocol import known_metrics
 from leaderboard.models import Method, Submission, User, Visibility
 from tests import builders, pages
 from tests.leaderboard.web.boards.test_board import MID, row_of
@@ -47,8 +46,8 @@ def test_values_have_intervals_ranks_have_ranges_and_what_is_with_the_best_is_ma
     for cell in root.one("table", class_="board").all("td", class_="with-best"):
         assert ", statistically tied for best in its column (95% confidence)" in cell.text
     legend = root.one("details", class_="legend").text
-    assert re.search(r"values with 95% confidence intervals \(bootstrap over [\d,]+ recordings\)", legend)
-    assert "Rows quoted from papers (rings) have no confidence interval" in legend
+    assert re.search(r"the bar its 95% confidence interval \(bootstrap over [\d,]+ recordings\)", legend)
+    assert "Rings are values quoted from papers. They have no confidence interval" in legend
     published = row_of(root, "Deep Scale")
     assert "papers do not report" in published.one("td", class_="interval").attributes["title"]
     assert published.one("td", class_="interval").text == "no confidence interval"
@@ -127,13 +126,10 @@ def test_filters_that_nothing_fits_leave_a_sentence_and_a_way_back(
 @pytest.mark.parametrize(
     ("query", "sentence"),
     [
-        (
-            "columns=all",
-            f"The board has no columns 'all'; expected one of {', '.join(['both', *known_metrics()])}.",
-        ),
+        ("columns=all", "This address asks for unknown columns, “all”. The board shows all columns."),
         ("page=0", "The board has no page '0'; expected a number from 1 on."),
         ("page=٣", "expected a number from 1 on"),
-        ("sort=<script>", "cannot be sorted by"),
+        ("sort=<script>", "This board has no column “<script>” to sort by. It is sorted by rank."),
         ("at=2026-13-40", "is not a date or a time"),
         ("frames=9", "The filter 'frames' is '9'; expected one of 2, 3, 4, 5, 6."),
     ],

@@ -9,7 +9,7 @@ from django.conf import settings
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard.models import Edition, Publication, Submission, User
+from leaderboard.models import Edition, Evaluation, Method, Publication, PublishedResult, Submission, User
 from leaderboard.submissions import intake
 from tests import builders, pages
 from tests.editions import changed_on, corrected, extended, open_edition, publish, roll_back
@@ -60,10 +60,10 @@ def test_edition_names_its_ground_truth_protocol_counts_and_time(client: Client,
     counts = truth.counts
     assert shown["Sequences"] == "120 in 24 recordings"
     assert shown["TTC ranges"] == (
-        f"crucial {counts['crucial']}, small {counts['small']}, "
-        f"large {counts['large']}, negative {counts['negative']}, out of range {counts['out_of_range']}"
+        f"{counts['crucial']} in 0–3 s, {counts['small']} in 3–6 s, "
+        f"{counts['large']} in 6–20 s, {counts['negative']} in −20–0 s, {counts['out_of_range']} out of range"
     )
-    assert shown["Changed"] == "5 labels corrected, compared with edition 1"
+    assert shown["What changed"] == "5 labels corrected, compared with edition 1"
     assert shown["Published"].endswith("UTC: “Labels corrected.”")
 
 
@@ -101,8 +101,43 @@ def test_past_board_leads_to_its_edition_and_to_the_board_now(client: Client, re
     Publication.objects.filter(edition__number=1).update(at=long_ago)
     root = get(client, f"/board/test/?at={long_ago + timedelta(days=1):%Y-%m-%d}")
     links = [a.attributes["href"] for a in root.one("p", class_="notice").all("a")]
-    assert links == [OLD, "/board/test/"]
+    assert links == [OLD, "/board/test/", "#changes"]
     assert "#changelog" not in str([a.attributes["href"] for a in root.one("p", class_="facts").all("a")])
+
+
+def test_past_board_lists_what_has_changed_since(
+    client: Client, entries: list[Submission], owner: User
+) -> None:
+    now = timezone.now()
+    Publication.objects.update(at=now - timedelta(days=9))
+    Evaluation.objects.update(finished_at=now - timedelta(days=8))
+    Method.objects.update(shown_at=now - timedelta(days=8))
+    builders.submit(
+        owner, builders.predictions(entries[0].evaluations.get().edition, factor=1.01), method="New"
+    )
+    builders.score_all()
+    intake.withdraw(submission=entries[1], actor=owner, now=now)
+    root = get(client, f"/board/test/?at={now - timedelta(days=2):%Y-%m-%d}")
+    section = root.one("section", **{"aria-labelledby": "changes"})
+    changed = [
+        (row.one("th").text, *(cell.text for cell in row.all("td"))) for row in section.one("tbody").all("tr")
+    ]
+    assert [row[:3] for row in changed[:2]] == [("New", "new", "1"), ("M1.05", "another rank", "1 → 2")]
+    assert changed[-1][:2] == ("M1.1", "withdrawn")
+    assert changed[-1][2].endswith(" → –")
+    assert "Deep Scale" in {row[0] for row in changed if row[1] == "another rank"}
+    assert get(client, "/board/test/").all("section", **{"aria-labelledby": "changes"}) == []
+
+
+def test_a_day_before_the_first_edition_says_so_and_offers_another_day(
+    client: Client, entries: list[Submission]
+) -> None:
+    PublishedResult.objects.all().delete()
+    root = get(client, "/board/test/?at=2020-01-01")
+    first = f"its first edition was published on {Publication.objects.get().at:%Y-%m-%d}."
+    assert f"There was no Test board yet on 2020-01-01: {first}" in root.one("p", class_="notice").text
+    day = root.one("details", class_="as-of").one("input", type="date").attributes
+    assert (day["value"], day["max"]) == ("2020-01-01", f"{timezone.now() - timedelta(days=1):%Y-%m-%d}")
 
 
 @pytest.mark.parametrize(
@@ -135,7 +170,7 @@ def test_list_has_every_published_edition_and_what_became_of_it(
         [
             "edition 1",
             f"replaced by edition 2 on {changed}",
-            "the first",
+            "first edition",
             opened,
             first,
             "tsttc-1",
@@ -186,7 +221,7 @@ def test_withdrawn_entry_leaves_its_mark_in_a_former_edition(
     assert row.one("div", class_="name").text == f"M1.05 withdrawn {withdrawn_at:%Y-%m-%d}"
     assert {cell.text for cell in row.all("td")} - {""} == {"–"}
     notices = [each.text for each in root.all("p", class_="notice")]
-    assert "1 row was withdrawn by its team: the scores are removed from all editions." in notices
+    assert "1 row was withdrawn by its team. The scores were removed from all editions." in notices
 
 
 def test_every_page_that_stays_has_its_own_canonical_address(client: Client, replaced: Edition) -> None:

@@ -154,9 +154,9 @@ def test_leaders_by_range_stand_below_their_chart_as_a_table(
     client: Client, entries: list[Submission]
 ) -> None:
     root = get(client, "/board/test/charts/")
-    leads = root.one("section", **{"aria-labelledby": "profile"}).one("table", class_="attempts-list")
+    leads = root.one("section", **{"aria-labelledby": "leaders"}).one("tbody")
     assert [row.one("th").text for row in leads.all("tr")] == ["0–3 s", "3–6 s", "6–20 s", "−20–0 s"]
-    assert leads.text == get(client, "/").one("table", class_="attempts-list").text
+    assert leads.text == get(client, "/").one("table", class_="attempts-list").one("tbody").text
 
 
 def test_private_methods_are_in_no_chart_not_even_their_teams(
@@ -219,16 +219,42 @@ def test_first_rows_are_compared_once_the_page_is_read(client: Client, compared:
     assert Comparison.objects.count() == n_pairs
 
 
-def test_resolution_of_each_column_stands_once_below_the_pairs(
+def test_resolution_of_each_column_is_a_table_of_ranges_and_metrics(
     client: Client, compared: list[Submission]
 ) -> None:
-    def resolutions() -> list[str]:
-        return [part.text for part in pages.page(client.get("/board/test/charts/")).all("p", id="resolution")]
+    def resolutions() -> list[pages.Element]:
+        return get(client, "/board/test/charts/").all("section", **{"aria-labelledby": "resolution"})
 
     assert resolutions() == [], "nothing is known yet"
     builders.infer_all()
-    (text,) = resolutions()
-    assert "(medians of 3 pairs)" in text
+    (section,) = resolutions()
+    assert [head.text for head in section.one("thead").all("th")] == ["TTC range", "MiD ×10⁻⁴", "RTE %"]
+    rows_of_ranges = section.one("tbody").all("tr")
+    assert [row.one("th").text for row in rows_of_ranges] == [
+        "overall",
+        "0–3 s",
+        "3–6 s",
+        "6–20 s",
+        "−20–0 s",
+    ]
+    assert all(float(cell.text) > 0 for cell in rows_of_ranges[0].all("td"))
+
+
+def test_pairs_that_do_not_differ_are_named_above_the_map(
+    client: Client, edition: Edition, compared: list[Submission], owner: User
+) -> None:
+    def words() -> str:
+        client.get("/board/test/charts/")
+        builders.infer_all()
+        return get(client, "/board/test/charts/").one("section", id="pairs").text
+
+    assert "All tested pairs differ significantly (p < 0.05)." in words()
+    builders.submit(owner, builders.predictions(edition, factor=1.05), method="Twin")
+    builders.score_all()
+    assert (
+        "All tested pairs differ significantly (p < 0.05), except M1.05 (rank 1) and Twin (rank 1)."
+        in words()
+    )
 
 
 def test_pairs_that_are_withheld_show_their_published_difference_alone(
