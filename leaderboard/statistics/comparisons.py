@@ -4,6 +4,7 @@ A reader gets what is known at once. Unknown pairs are queued: only workers have
 """
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
@@ -138,7 +139,7 @@ def compare(
     board.edition.split = board.split
     chosen = _chosen(board, methods, viewer)
     if best_first and len(chosen) > MIN_METHODS:
-        chosen.sort(key=lambda entry: entry.value or 0.0)
+        chosen.sort(key=lambda entry: math.inf if entry.value is None else entry.value)
     asked = list(itertools.combinations(chosen, 2))
     withheld = _withheld(board.edition, asked)
     known = _known(board.edition, chosen)

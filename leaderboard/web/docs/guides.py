@@ -63,10 +63,10 @@ _PYTHON: Final = "python"
 """The guide that the reference of the packages follows."""
 # Pages that a guide names by their paths, and that anybody may ask for.
 _PAGES: Final = frozenset(
-    re.findall(
-        r"[\w-]+",
-        "account account_data api-root api-schema api_reference compare dist docs feed_of_all mails "
-        "published submissions submit team tokens",
+    (
+        *("account", "account_data", "mails", "submissions", "submit", "team", "tokens"),
+        *("api-root", "api-schema", "api_reference", "docs"),
+        *("compare", "dist", "feed_of_all", "published"),
     )
 )
 _SCHEMES: Final = {"http", "https", "mailto"}
