@@ -94,8 +94,8 @@ def _front_series(
     """Return the series of submissions and of published results, and the legend's names."""
     front = [each for each in points if each.is_front]
     series = [staircase(line, [*((each.x, each.y) for each in front), (end, front[-1].y)])]
-    # A front of one point is no line.
-    names = [line] if len(front) > 1 else []
+    # A front of one point is a line only if it goes on to the end.
+    names = [line] if len(front) > 1 or end > front[-1].x else []
     for kind, name, symbol in (("submission", SUBMITTED, "circle"), ("published", QUOTED, "diamond")):
         of_kind = [each for each in points if each.entry.kind == kind]
         if not of_kind:
