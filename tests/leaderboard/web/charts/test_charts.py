@@ -333,7 +333,7 @@ def test_errors_by_time_stand_beside_those_of_the_best_public_row_and_of_the_bas
     series = options_of(figure)["series"]
     grey = [each for each in series if each["name"] == "Best on the board: Best"]
     dashed = {each["name"] for each in series if each.get("lineStyle", {}).get("type") == "dashed"}
-    assert dashed == {"Baseline (dashed): Pixel MSE, ours"}
+    assert dashed == {"Baseline: Pixel MSE, ours"}
     assert [y for each in grey if each["yAxisIndex"] == 0 for _, y in each["data"]] == [
         row["mid"] for row in best
     ]
