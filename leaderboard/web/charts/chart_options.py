@@ -283,7 +283,9 @@ class Frame:
     def _legend(self, name_px: int) -> Option:
         return {
             "show": bool(self.names),
-            "data": [{"name": name, "icon": self.keys[name]} if name in self.keys else name for name in self.names],
+            "data": [
+                {"name": name, "icon": self.keys[name]} if name in self.keys else name for name in self.names
+            ],
             "left": 0,
             "top": 0,
             "itemGap": 14,

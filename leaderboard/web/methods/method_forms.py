@@ -79,7 +79,7 @@ class ShowForm(SiteForm):
         label="Becomes public on",
         required=False,
         error_messages={"invalid": "Enter a date such as 2027-03-01."},
-        help_text="Optional. At 00:00 UTC of this day. Without a day, it stays anonymous until you change it.",
+        help_text="Optional, at 00:00 UTC. Without a day, it stays anonymous until you change it.",
         widget=forms.DateInput(attrs={"type": "date"}),
     )
     needs_day = False
