@@ -326,9 +326,9 @@ def _bar_ticks(bins: Sequence[Row]) -> list[tuple[float, str]]:
     if end <= 0:
         return [(0.0, "0"), rest]
     ticks = [tick for tick in round_ticks(0.0, end, n=4) if tick <= end]
-    places = [((len(bins) - 1) * tick / end, tick_text(tick)) for tick in ticks]
+    placed = [((len(bins) - 1) * tick / end, tick_text(tick)) for tick in ticks]
     # A narrow window has no room for two texts side by side.
-    return [*(place for place in places if rest[0] - place[0] > 0.1 * len(bins)), rest]
+    return [*((x, text) for x, text in placed if rest[0] - x > 0.1 * len(bins)), rest]
 
 
 # --- predicted against true ------------------------------------------------------------------------------
