@@ -11,11 +11,11 @@ class MailKind(models.TextChoices):
     """What a mail is about. A person can switch off every kind but the first."""
 
     ACCOUNT = "account", "Your account"
-    SCORED = "scored", "My files submitted on the site: scored, rejected or failed"
-    EDITION = "edition", "New editions of boards with entries of my team"
-    TOKEN = "token", "My API tokens expiring within a week"
-    DEADLINE = "deadline", "Splits my team submitted to that close within three days"
-    ANNOUNCEMENT = "announcement", "Announcements about splits my team submitted to"
+    SCORED = "scored", "A file that I submitted on the site is scored, rejected or failed"
+    EDITION = "edition", "A board with methods of my team has a new edition"
+    TOKEN = "token", "One of my API tokens expires within a week"
+    DEADLINE = "deadline", "A split that my team submitted to closes within three days"
+    ANNOUNCEMENT = "announcement", "A split that my team submitted to has an announcement"
 
 
 class Mail(models.Model):

@@ -77,7 +77,7 @@ _CHOICES: Final = [(kind.value, kind.label) for kind in MailKind if kind is not 
 
 class MailsForm(SiteForm):
     wanted = forms.MultipleChoiceField(
-        label="Email me about", choices=_CHOICES, required=False, widget=forms.CheckboxSelectMultiple
+        label="Email me when", choices=_CHOICES, required=False, widget=forms.CheckboxSelectMultiple
     )
 
 

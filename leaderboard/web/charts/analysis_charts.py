@@ -38,7 +38,10 @@ MISSED, FALSE = "Missed warnings", "False alarms"
 SHARE: Final = "Share of sequences"
 Row = Mapping[str, Any]
 Reference = tuple[str, Entry, Sequence[Row]]
-_DASHES: Final = ("solid", "dashed")  # of the reference curves
+# Of the reference curves, and the same as a key: one of ECharts is too short to show dashes, and has a dot.
+_DASHES: Final = ("solid", "dashed")
+_KEYS: Final = ("path://M0 0H20V3H0Z", "path://M0 0H8V3H0ZM12 0H20V3H12Z")
+_NEAR_S: Final = 6.0
 
 
 def error_analysis_tables(closer: Analysis, references: Sequence[Reference]) -> dict[str, Any]:
@@ -92,13 +95,10 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric], references: Sequence[Re
     has_intervals = any(_interval(row, metric) for row in bins for metric in errors)
     of_bin = [{(row["low_s"], row["high_s"]): row for row in others} for _, _, others in references]
     drawn = [row for rows in (*(others for _, _, others in references), bins) for row in rows]
-    # A key of the chart is too short to show dashes.
-    names = [
-        f"{label}{how}: {entry.method}"
-        for how, (label, entry, _) in zip(("", " (dashed)"), references, strict=False)
-    ]
+    names = [f"{label}: {entry.method}" for label, entry, _ in references]
+    axes = {metric: _axis_of(metric, drawn) for metric in errors}
     frame = Frame(
-        x_axes=[x_axis("True time to contact in s", _TTC_AXIS) for _ in errors],
+        x_axes=[x_axis("True time to contact in s", axes[metric]) for metric in errors],
         y_axes=[error_axis(metric, _ends(drawn, metric)) for metric in errors],
         series=[
             *(
@@ -115,6 +115,7 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric], references: Sequence[Re
             ),
         ],
         names=[MEAN, *([SPAN] if has_intervals else []), *names],
+        keys=dict(zip(names, _KEYS, strict=False)),
     )
     others_columns = [f"{metric.symbol} of {entry.method}" for _, entry, _ in references for metric in errors]
     columns = ("Time to contact in s", "Sequences", *(metric.heading for metric in errors), *others_columns)
@@ -139,7 +140,18 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric], references: Sequence[Re
         ),
         numbers=tuple(range(1, len(columns))),
         has_intervals=has_intervals,
+        note=f"{WARNING.symbol} is drawn from 0 to {_NEAR_S:g} s. It is at most 1% at all other times."
+        if axes.get(WARNING, _TTC_AXIS) is not _TTC_AXIS
+        else "",
     )
+
+
+def _axis_of(metric: Metric, rows: Sequence[Row]) -> Option:
+    """Return the axis of true times; near the threshold only, if warnings elsewhere are hardly ever wrong."""
+    far = [row[metric.name] for row in rows if not 0 <= _middle(row) <= _NEAR_S]
+    if metric is not WARNING or max(far, default=0.0) > 1:
+        return _TTC_AXIS
+    return {**_TTC_AXIS, "min": 0, "max": _NEAR_S, "interval": 1}
 
 
 def _middle(row: Row) -> float:
@@ -314,7 +326,9 @@ def _bar_ticks(bins: Sequence[Row]) -> list[tuple[float, str]]:
     if end <= 0:
         return [(0.0, "0"), rest]
     ticks = [tick for tick in round_ticks(0.0, end, n=4) if tick <= end]
-    return [*(((len(bins) - 1) * tick / end, tick_text(tick)) for tick in ticks), rest]
+    placed = [((len(bins) - 1) * tick / end, tick_text(tick)) for tick in ticks]
+    # A narrow window has no room for two texts side by side.
+    return [*((x, text) for x, text in placed if rest[0] - x > 0.1 * len(bins)), rest]
 
 
 # --- predicted against true ------------------------------------------------------------------------------

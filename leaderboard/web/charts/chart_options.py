@@ -213,6 +213,7 @@ class Frame:
     y_axes: Sequence[Option]
     series: Sequence[Option]
     names: Sequence[str] = ()  # of the legend
+    keys: Mapping[str, str] = field(default_factory=dict)  # of these names in it, in place of their own
     further_x_axes: Sequence[Option] = ()  # of the last panel
     left: tuple[int, int] = (
         _LEFT_PX,
@@ -232,7 +233,7 @@ class Frame:
             "useUTC": True,
             "textStyle": {"color": "--ink"},
             "xAxis": [
-                *({**axis, "id": f"x{i}", "gridIndex": i} for i, axis in enumerate(self.x_axes)),
+                *({**axis, "gridIndex": i} for i, axis in enumerate(self.x_axes)),
                 *({**axis, "gridIndex": n_panels - 1, "position": "bottom"} for axis in self.further_x_axes),
             ],
             "yAxis": [{**axis, "gridIndex": i} for i, axis in enumerate(self.y_axes)],
@@ -261,10 +262,6 @@ class Frame:
         }
         if self.series_by_width[is_narrow]:
             layout["series"] = list(self.series_by_width[is_narrow])
-        if n_panels > 1:  # one above the other, only the last has room for a name below it
-            shown = [not is_narrow or number == n_panels - 1 for number in range(n_panels)]
-            names = [axis["name"] if keeps else "" for axis, keeps in zip(self.x_axes, shown, strict=True)]
-            layout["xAxis"] = [{"id": f"x{number}", "name": name} for number, name in enumerate(names)]
         if left == _LEFT_PX:
             return layout
         return layout | {
@@ -286,7 +283,9 @@ class Frame:
     def _legend(self, name_px: int) -> Option:
         return {
             "show": bool(self.names),
-            "data": list(self.names),
+            "data": [
+                {"name": name, "icon": self.keys[name]} if name in self.keys else name for name in self.names
+            ],
             "left": 0,
             "top": 0,
             "itemGap": 14,

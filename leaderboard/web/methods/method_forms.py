@@ -38,7 +38,7 @@ class MethodForm(DetailsForm):
     @classmethod
     def of_method(cls, request: HttpRequest, *, method: Method) -> "MethodForm":
         form = cls.asked(request, initial=_stated(method))
-        form.fields["description"].widget.attrs["rows"] = 14
+        form.fields["description"].widget.attrs["rows"] = 5
         return form
 
     def changes(self) -> dict[str, object]:
@@ -79,9 +79,10 @@ class ShowForm(SiteForm):
         label="Becomes public on",
         required=False,
         error_messages={"invalid": "Enter a date such as 2027-03-01."},
-        help_text="Optional, at 00:00 UTC. Without a day it stays anonymous until you make it public.",
+        help_text="Optional, at 00:00 UTC. Without a day, it stays anonymous until you change it.",
         widget=forms.DateInput(attrs={"type": "date"}),
     )
+    needs_day = False
     # The preview is a form, too, and asks for no tick.
     confirm = confirmation()
 
@@ -92,14 +93,27 @@ class ShowForm(SiteForm):
     @classmethod
     def of_method(cls, request: HttpRequest, *, method: Method) -> "ShowForm":
         """Return the posted form, or the preview that the address asks for."""
-        if request.method == "POST":
-            return cls(request.POST)
         chosen = request.GET.get("visibility", "")
-        if chosen not in visibility.choices(method):
-            is_next_public = method.visibility == Visibility.ANONYMOUS and method.reveal_at is None
-            marked = Visibility.PUBLIC if is_next_public else method.visibility
-            return cls(initial={"visibility": marked, "reveal_on": _day(method.reveal_at)})
-        return cls({"visibility": chosen, "reveal_on": request.GET.get("reveal_on", "")})
+        if request.method == "POST":
+            form = cls(request.POST)
+        elif chosen in visibility.choices(method):
+            form = cls({"visibility": chosen, "reveal_on": request.GET.get("reveal_on", "")})
+        else:
+            # Nothing is marked but what a method with a day has already: publishing has no way back.
+            marked = method.visibility if method.reveal_at else ""
+            form = cls(initial={"visibility": marked, "reveal_on": _day(method.reveal_at)})
+        form.needs_day = method.visibility == Visibility.ANONYMOUS and method.reveal_at is None
+        if form.needs_day:
+            form.fields["reveal_on"].help_text = "At 00:00 UTC of this day."
+        return form
+
+    def clean(self) -> dict[str, Any]:
+        """Refuse a later day that is none, which would change nothing."""
+        fields = self.cleaned_data
+        is_later = self.needs_day and fields["visibility"] == Visibility.ANONYMOUS
+        if is_later and fields.get("reveal_on") is None and "reveal_on" not in self.errors:
+            self.add_error("reveal_on", "Enter the day on which it becomes public.")
+        return fields
 
     def wanted(self) -> dict[str, Any]:
         """Return the arguments of the domain function: the day begins at midnight UTC."""

@@ -45,6 +45,7 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
         "visibility": row.visibility,
         "is_named": row.is_named_for(request.user),
         "is_mine": is_mine,
+        "can_be_deleted": is_mine and empty_methods.can_be_deleted(row),
         "method_id": row.pk,
         "results": [
             method_result(result, of_result) for result, of_result in zip(achieved, pairs, strict=True)

@@ -51,7 +51,7 @@ class SubmissionForm(DetailsForm):
 
     split = forms.CharField(error_messages={"required": "No split was chosen; expected one of those listed."})
     method = forms.CharField(
-        help_text="Type a new name, or choose one of your team’s methods.",
+        help_text="Type a new name, or the name of one of your team’s methods.",
         error_messages={"required": "No method was named; expected its name on the board."},
         widget=forms.TextInput(attrs={"list": "methods", "maxlength": 80, "autocomplete": "off"}),
     )
@@ -71,7 +71,7 @@ class SubmissionForm(DetailsForm):
 
     note = forms.CharField(
         required=False,
-        help_text="Only your team sees it.",
+        help_text="Optional. Only your team sees it.",
         widget=forms.TextInput(attrs={"maxlength": 500, "autocomplete": "off"}),
     )
 

@@ -41,11 +41,6 @@ class ShownProblem(NamedTuple):
     where: str
     code: str
 
-    @property
-    def is_listed(self) -> bool:
-        """Tell whether the sentence names the places itself."""
-        return self.rest.startswith(": ")
-
 
 @dataclass(frozen=True)
 class StateLine:

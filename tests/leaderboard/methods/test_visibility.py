@@ -194,9 +194,14 @@ def test_an_anonymous_method_offers_to_be_made_public(
         assert "Make public…" in words
         assert "Publish…" not in words
     page = pages.get(client, f"/methods/{method.pk}/visibility/")
-    assert page.one("main").one("h1").text == "Make Secret sauce public"
-    (marked,) = [radio for radio in page.all("input", type="radio") if "checked" in radio.attributes]
-    assert marked.attributes["value"] == "PUBLIC"
+    assert page.one("main").one("h1").text == "Make “Secret sauce” public"
+    radios = page.all("input", type="radio")
+    assert not [radio for radio in radios if "checked" in radio.attributes], "it has no way back"
+    response = client.get(f"/methods/{method.pk}/visibility/", {"visibility": "ANONYMOUS"})
+    assert (response.status_code, "reveal_on" in response.context["form"].errors) == (422, True)
+    later = f"{timezone.now() + timedelta(days=9):%Y-%m-%d}"
+    asked = {"visibility": "ANONYMOUS", "reveal_on": later}
+    assert client.get(f"/methods/{method.pk}/visibility/", asked).status_code == 200
     change(method, "ANONYMOUS", owner, reveal_at=timezone.now() + timedelta(days=9))
     page = pages.get(client, f"/methods/{method.pk}/visibility/")
     (marked,) = [radio for radio in page.all("input", type="radio") if "checked" in radio.attributes]

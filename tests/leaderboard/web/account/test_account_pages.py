@@ -41,7 +41,7 @@ def test_account_begins_with_what_it_has_and_leads_to_each_part(signed_in: Clien
     builders.token(owner)
     root = pages.get(signed_in, "/account/")
     parts = {
-        link.text: (row.all("td")[0].text, link.attributes["href"])
+        row.one("th").text: (row.all("td")[0].text, link.attributes["href"])
         for row in root.one("tbody").all("tr")
         for link in row.all("a")
     }

@@ -12,11 +12,11 @@ from django.contrib.auth.models import AnonymousUser
 from django.test import Client
 from django.utils import timezone
 
-from evaluator.metrics.registry import MID
+from evaluator.metrics.registry import MID, WARNING
 from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import Attempt
 from leaderboard.models import Comparison, Edition, Method, Submission, User
-from leaderboard.web.charts import board_charts, chart_views
+from leaderboard.web.charts import analysis_charts, board_charts, chart_views
 from tests import builders, pages
 from tests.pages import get
 
@@ -333,7 +333,7 @@ def test_errors_by_time_stand_beside_those_of_the_best_public_row_and_of_the_bas
     series = options_of(figure)["series"]
     grey = [each for each in series if each["name"] == "Best on the board: Best"]
     dashed = {each["name"] for each in series if each.get("lineStyle", {}).get("type") == "dashed"}
-    assert dashed == {"Baseline (dashed): Pixel MSE, ours"}
+    assert dashed == {"Baseline: Pixel MSE, ours"}
     assert [y for each in grey if each["yAxisIndex"] == 0 for _, y in each["data"]] == [
         row["mid"] for row in best
     ]
@@ -386,3 +386,18 @@ def test_of_a_large_board_the_front_and_the_lowest_are_drawn_and_the_chart_says_
     assert [float(row[3].partition(">")[2].partition("<")[0]) for row in chart.rows] == [60, 80, 50, 70]
     assert chart.note == "Shown are the 4 with the lowest MiD, or on the line, of 5."
     assert sum(len(each["data"]) for each in chart.options["baseOption"]["series"][1:]) >= 4
+
+
+@pytest.mark.parametrize(("far", "ends"), [(0.5, (0, 6.0)), (30.0, (-20.0, 20.0))])
+def test_wrong_warnings_are_drawn_near_the_threshold_unless_there_are_some_elsewhere(
+    far: float, ends: tuple[float, float]
+) -> None:
+    bins = [
+        {"low_s": low, "high_s": low + 1.0, "n": 9, MID.name: 1.0, WARNING.name: wrong}
+        for low, wrong in ((2.0, 40.0), (12.0, far))
+    ]
+    chart = analysis_charts.curve(bins, [MID, WARNING])
+    of_mid, of_warnings = chart.options["baseOption"]["xAxis"]
+    assert (of_mid["min"], of_mid["max"]) == (-20.0, 20.0)
+    assert (of_warnings["min"], of_warnings["max"]) == ends
+    assert bool(chart.note) is (ends[1] == 6.0)
