@@ -118,7 +118,7 @@ def test_what_is_one_s_own_is_listed_taken_back_and_withdrawn(job: Job) -> None:
     shown = tsttc("publish", "Job", "--yes")
     assert shown.returncode == 0, shown.stderr
     again = job.submit(sent, tsttc=tsttc)
-    assert again.stdout.startswith("Job is public: "), "a job is told, and not asked"
+    assert again.stdout.startswith("“Job” is public: "), "a job is told, and not asked"
     assert tsttc("board", "--format", "bibtex").stdout.startswith("@misc{shi2023tsttc,")
     assert tsttc("withdraw", submission["id"]).returncode == 2
     assert tsttc("withdraw", submission["id"], "--yes").stdout == "Job on test is withdrawn.\n"
@@ -137,7 +137,7 @@ def test_worse_method_fails_the_gate_and_the_better_one_is_shown(job: Job) -> No
     compared = job.tsttc("compare", "Steady", "Shaky")
     assert compared.returncode == 0, compared.stderr
     assert "The MiD of Steady is " in compared.stdout
-    assert "is not public, and the ground truth of test is hidden" in compared.stdout
+    assert "is not public, and the ground truth of Test is hidden" in compared.stdout
     anybody = command(job.site.url, "", home=job.home)
     assert "Steady" not in anybody("board").stdout
     assert job.tsttc("publish", "Steady").returncode == 2, "nobody has said that it is meant"
