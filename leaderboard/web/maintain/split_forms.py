@@ -96,15 +96,16 @@ class PolicyForm(QuotaRulesForm):
     decimals = forms.TypedChoiceField(
         choices=[(1, "one"), (2, "two")],
         coerce=int,
-        help_text="Of the scores, from the next edition on. More decimals reveal more about hidden ground truth.",
+        help_text="Of the scores, from the next edition on. More decimals reveal more about a hidden "
+        "ground truth.",
     )
     needs_admission = forms.BooleanField(label="Only admitted teams can submit", required=False)
     how_to_be_admitted = forms.CharField(
         label="How to request access",
         required=False,
         max_length=300,
-        help_text="Shown to teams without access, after “Only admitted teams can submit, and your team is not one "
-        "of them;”. Example: write to board@example.org.",
+        help_text="Shown to teams without access, after “Only admitted teams can submit”. Example: write to "
+        "board@example.org.",
     )
 
     layout: tuple[tuple[Section, ...], ...] = (
