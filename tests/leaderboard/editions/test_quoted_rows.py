@@ -1,6 +1,7 @@
 """Rows quoted from papers stand since the day they were added: what was shown before never changes."""
 
 import json
+import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,8 @@ from tests.leaderboard.web.test_every_page import assert_sound
 FORMS = ("/board/test/editions/1/", "/board/test/editions/1.csv", "/board/test/editions/1.tex")
 A_DAY = timedelta(days=1)
 PAGE = "/maintain/published/"
+# What a page of the past says of the present board.
+CHANGES = re.compile(rb'<section class="whole" aria-labelledby="changes">.*?</section>', re.DOTALL)
 
 
 def representations(client: Client, at: datetime) -> dict[str, bytes]:
@@ -31,7 +34,13 @@ def representations(client: Client, at: datetime) -> dict[str, bytes]:
     addresses = [*past, *api, *FORMS, "/board/test/editions/1.md", "/board/test/?at=2020-01-01"]
     responses = {address: client.get(address) for address in addresses}
     assert {response.status_code for response in responses.values()} == {200}
-    return {address: response.content for address, response in responses.items()}
+    return {address: CHANGES.sub(b"", response.content) for address, response in responses.items()}
+
+
+def changes_since(client: Client, at: datetime) -> str:
+    """The part of the same page that tells what is different now."""
+    shown = CHANGES.search(client.get(f"/board/test/?at={at.astimezone(UTC):%Y-%m-%dT%H:%M:%S.%fZ}").content)
+    return shown[0].decode() if shown else ""
 
 
 def on_board() -> dict[str, float | None]:
@@ -55,6 +64,7 @@ def test_a_row_that_is_added_or_replaced_changes_no_board_of_the_past_and_no_for
     assert (on_board()["Later"], on_board()["Deep-Scale"]) == (1.0, 0.5)
     assert "Deep Scale" not in on_board()
     assert representations(client, at) == before
+    assert "Later" in changes_since(client, at)
     later = client.get(f"/board/test.csv?at={timezone.now():%Y-%m-%dT%H:%M:%S.%fZ}").text
     assert "Later" in later
     assert board_now().updated_at is not None
