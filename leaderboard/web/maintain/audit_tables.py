@@ -3,6 +3,7 @@
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 from django.core.exceptions import ValidationError
@@ -10,8 +11,10 @@ from django.db.models import Model
 from django.urls import reverse
 
 from leaderboard import audit
+from leaderboard.methods.details import DETAILS
 from leaderboard.models import AuditEvent, Edition, Evaluation, Method, Split, Submission, Team, User
 from leaderboard.pages.texts import PAGES
+from leaderboard.submissions.status_text import short_fault
 
 MAX_LISTED: Final = 5
 _DIGEST: Final = re.compile(r"(sha256:[0-9a-f]{8})[0-9a-f]{56}")
@@ -19,6 +22,10 @@ _MOMENT: Final = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d):\d\d(?:\.\d+)?\+0
 # In `before → after`, as a change of a split is kept.
 _PYTHON: Final = re.compile(r"(?<=→ )(?:None|True|False)$|^(?:None|True|False)(?= →)")
 _WORDS: Final = {"None": "none", "True": "yes", "False": "no"}
+_FIELDS: Final = {each.name: each.label.lower() for each in DETAILS} | {
+    "paper_url": "paper link",
+    "code_url": "code link",
+}
 _VERBS: Final = {
     "shown": "visibility changed",
     "revealed": "made public on its day",
@@ -50,10 +57,11 @@ def noun_words(noun: str) -> str:
 
 
 class Subject(NamedTuple):
-    """The name of what an event is about, and its page if it has one."""
+    """The name of what an event is about, its page if it has one, and facts that tell it from others."""
 
     name: str
     href: str = ""
+    facts: Mapping[str, str] = MappingProxyType({})
 
 
 class AuditRow(NamedTuple):
@@ -103,6 +111,12 @@ def _details(
         if name in {"user", "team", "from", "to"} and (noun, text) in subjects
     }
     texts |= {name: text or "(blanked)" for name, text in named(event, names).items()}
+    if texts.get("from") and texts.get("to"):
+        texts = {"": f"{texts.pop('from')} → {texts.pop('to')}"} | texts
+    facts = {**subjects.get((event.noun, event.noun_id), Subject("")).facts}
+    if event.verb != "rejected":
+        facts.pop("reason", None)
+    texts = facts | texts
     return [(name.removeprefix("is_").replace("_", " "), text) for name, text in texts.items() if text]
 
 
@@ -112,7 +126,10 @@ def _words(value: Any) -> str:
     if isinstance(value, list):
         n_more = len(value) - MAX_LISTED
         more = f" and {n_more:,} more" if n_more > 0 else ""
-        return ", ".join(str(each).replace("_", " ") for each in value[:MAX_LISTED]) + more
+        return (
+            ", ".join(_FIELDS.get(str(each), str(each).replace("_", " ")) for each in value[:MAX_LISTED])
+            + more
+        )
     text = "" if value is None else _PYTHON.sub(lambda match: _WORDS[match[0]], str(value))
     if text.isupper():  # a choice, as PRIVATE
         return text.lower()
@@ -154,6 +171,12 @@ def _submission(row: Submission) -> Subject:
     return Subject(f"{row.method.name} on {row.split.title}", reverse("submission", args=[row.pk]))
 
 
+def _evaluation(row: Evaluation) -> Subject:
+    reason = short_fault(row.problems[0]["message"]) if row.problems else ""
+    facts = {"edition": str(row.edition.number)} | ({"reason": reason} if reason else {})
+    return _submission(row.submission)._replace(facts=facts)
+
+
 _TABLES: Final[Mapping[str, tuple[Any, tuple[str, ...], Callable[[Any], Subject]]]] = {
     "Edition": (
         Edition,
@@ -164,8 +187,8 @@ _TABLES: Final[Mapping[str, tuple[Any, tuple[str, ...], Callable[[Any], Subject]
     ),
     "Evaluation": (
         Evaluation,
-        ("submission__method", "submission__split"),
-        lambda row: _submission(row.submission),
+        ("submission__method", "submission__split", "edition"),
+        _evaluation,
     ),
     "Method": (Method, (), lambda row: Subject(row.name, reverse("method", args=[row.pk]))),
     "Split": (Split, (), lambda row: Subject(row.title, reverse("maintain_split", args=[row.pk]))),

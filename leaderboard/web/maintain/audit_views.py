@@ -51,7 +51,7 @@ class AuditFilter(SiteForm):
     noun = forms.ChoiceField(
         label="Object type", required=False, choices=partial(_occurring, "noun", audit_tables.noun_words)
     )
-    noun_id = forms.CharField(label="Object ID starts with", required=False, max_length=80, widget=_narrow())
+    noun_id = forms.CharField(required=False, max_length=80, widget=forms.HiddenInput)
     since = _day("From")
     until = _day("To")
 
@@ -69,7 +69,7 @@ def _midnight(day: date) -> datetime:
     return datetime.combine(day, time(), tzinfo=UTC)
 
 
-PER_PAGE = 100
+PER_PAGE = 50
 
 
 @maintainers_only

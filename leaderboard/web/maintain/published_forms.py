@@ -44,7 +44,7 @@ class RowForm(SiteForm):
     authors = _text("Authors, separated by commas")
     year = forms.IntegerField(widget=forms.NumberInput(attrs={"inputmode": "numeric"}))
     url = _text("Link to the paper", placeholder="https://")
-    table = _text("Where the numbers are", placeholder="Table 2")
+    table = _text("Table or section", placeholder="Table 2")
     code = _text("Link to the code (optional)", is_required=False, placeholder="https://")
     scores = forms.CharField(widget=forms.Textarea(attrs={"spellcheck": "false", "class": "digest"}))
     is_replacing = _replacing("the existing row of this method")
@@ -54,9 +54,9 @@ class RowForm(SiteForm):
         protocol = _protocol_of(_first_split())
         n_lines, n_each = len(protocol.metrics), len(protocol.range_names)
         self.fields["scores"].help_text = (
-            f"{n_lines * n_each} numbers, separated by spaces: {n_lines} lines, one for each of "
-            f"{', '.join(metric.symbol for metric in protocol.metrics)}, with {n_each} numbers in each line: "
-            f"{', '.join(protocol.range_names)}. Write – where the paper gives no number."
+            f"{n_lines} lines: {', '.join(metric.symbol for metric in protocol.metrics)}. "
+            f"{n_each} numbers in each, separated by spaces: {', '.join(protocol.range_names)}. "
+            "Where the paper gives no number, write –."
         )
         self.fields["scores"].widget.attrs["rows"] = n_lines
 

@@ -1,11 +1,14 @@
 """Published results, for maintainers: those on the boards, and a form to add a paper's."""
 
+from typing import Any
+
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect
 from django.utils import timezone
 
 from evaluator.metrics.protocol import known_metrics
+from evaluator.metrics.registry import Metric
 from leaderboard.editions import splits
 from leaderboard.models import PublishedResult
 from leaderboard.web.maintain.maintainer_views import (
@@ -45,7 +48,7 @@ def published(request: HttpRequest) -> HttpResponse:
         "row_form": row_form,
         "document_form": form,
         "example": example(),
-        "papers": _by_paper(),
+        **_by_paper(),
         "opened": request.GET.get("form", ""),
     }
     form = row_form if is_row else form
@@ -63,17 +66,18 @@ def published(request: HttpRequest) -> HttpResponse:
     return form_page(request, "maintain/published.html", form, **context)
 
 
-def _by_paper() -> list[list[tuple[PublishedResult, str]]]:
-    """Return the rows on the boards with their overall scores, by split and paper."""
-    papers: dict[tuple[str, ...], list[tuple[PublishedResult, str]]] = {}
-    for row in splits.quoted():
+def _by_paper() -> dict[str, Any]:
+    """Return the rows on the boards by split and paper, with the overall scores that any of them has."""
+    rows = list(splits.quoted())
+    metrics = [each for name, each in known_metrics().items() if any(name in row.scores for row in rows)]
+    papers: dict[tuple[str, ...], list[tuple[PublishedResult, list[tuple[Metric, str]]]]] = {}
+    for row in rows:
         paper = (row.split_id, row.source_url, row.source_title, row.source_table)
-        papers.setdefault(paper, []).append((row, _overall_words(row)))
-    return list(papers.values())
+        papers.setdefault(paper, []).append(
+            (row, [(each, _words(row.scores.get(each.name))) for each in metrics])
+        )
+    return {"papers": list(papers.values()), "metrics": metrics}
 
 
-def _overall_words(row: PublishedResult) -> str:
-    """The overall scores of a row."""
-    values = ((metric, row.scores.get(metric.name)) for metric in known_metrics().values())
-    words = (f"{each.symbol} {value}{each.unit_of_value}" for each, value in values if value is not None)
-    return ", ".join(words) or "–"
+def _words(value: float | None) -> str:
+    return "–" if value is None else str(value)

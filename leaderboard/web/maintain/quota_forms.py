@@ -51,23 +51,23 @@ def _count_field(name: str, label: str, help_text: str) -> forms.IntegerField:
 class QuotaRulesForm(SiteForm):
     quota_limit = _count_field(
         "quota_limit",
-        "Submissions",
-        "Of one team in the window. Leave empty for no limit; 0 allows none.",
+        "Submissions of a team",
+        "The most in the time window. Empty: no limit; 0: none allowed.",
     )
     quota_window = SpanField(
-        label="Window",
+        label="Time window",
         help_text="The time in which they count, for example 30 days or 24 hours.",
         error_messages={"required": "No window was given; expected one like 30 days or 24 hours."},
     )
     quota_min_gap = SpanField(
         label="Time between submissions",
         required=False,
-        help_text="Shortest time between two submissions of a team. Leave empty for none.",
+        help_text="Shortest time between two submissions of a team. Empty: none.",
     )
     quota_rejected_limit = _count_field(
         "quota_rejected_limit",
         "Rejected or cancelled files",
-        "Of one team in 24 hours. Leave empty for no limit.",
+        "Of a team in 24 hours. Empty: no limit.",
     )
 
 

@@ -32,7 +32,9 @@ class Section(NamedTuple):
     note: str = ""
 
 
-_DATES: Final = Section("Dates", (), ("opens_at", "closes_at"), _ZONE)
+_DATES: Final = Section(
+    "Dates", (), ("opens_at", "closes_at"), f"{_ZONE[:-1]}; also where an announcement ends."
+)
 _ANNOUNCEMENT: Final = Section("Announcement", ("announcement", "announcement_ends_at"))
 _QUOTA_FIELDS: Final = ("quota_limit", "quota_window", "quota_min_gap", "quota_rejected_limit")
 _ADMISSION: Final = Section("Admission", ("needs_admission", "how_to_be_admitted"))
@@ -82,29 +84,28 @@ class PolicyForm(QuotaRulesForm):
         help_text="Splits are sorted by this number, smallest first.",
         widget=forms.NumberInput(attrs={"inputmode": "numeric"}),
     )
-    opens_at = MomentField("Opens", "Leave empty to open as soon as there is ground truth.")
-    closes_at = MomentField("Closes", "Leave empty if it never closes.")
+    opens_at = MomentField("Opens", "Empty: as soon as there is ground truth.")
+    closes_at = MomentField("Closes", "Empty: never.")
     announcement = forms.CharField(
-        label="Text",
+        label="Text of the announcement",
         required=False,
         max_length=300,
-        help_text="One line of plain text on the pages of the split and in the API. Leave empty for none.",
+        help_text="One line of plain text on the pages of the split and in the API. Empty: no announcement.",
     )
-    announcement_ends_at = MomentField("Ends", f"Required if there is a text. {_ZONE}")
+    announcement_ends_at = MomentField("Announcement ends", "Required if there is a text.")
     decimals = forms.TypedChoiceField(
         choices=[(1, "one"), (2, "two")],
         coerce=int,
-        help_text="Of the scores in the next edition. More decimals reveal more of a hidden ground truth.",
+        help_text="Of the scores, from the next edition on. More decimals reveal more about a hidden "
+        "ground truth.",
     )
-    needs_admission = forms.BooleanField(
-        label="Restricted", required=False, help_text="Only admitted teams can submit."
-    )
+    needs_admission = forms.BooleanField(label="Only admitted teams can submit", required=False)
     how_to_be_admitted = forms.CharField(
         label="How to request access",
         required=False,
         max_length=300,
-        help_text="Teams without access read: “Only admitted teams can submit, and your team is not one of "
-        "them;” and then this text. Example: write to board@example.org.",
+        help_text="Shown to teams without access, after “Only admitted teams can submit”. Example: write to "
+        "board@example.org.",
     )
 
     layout: tuple[tuple[Section, ...], ...] = (
@@ -112,11 +113,17 @@ class PolicyForm(QuotaRulesForm):
         (_ANNOUNCEMENT, Section("Quota", (), _QUOTA_FIELDS), _ADMISSION),
     )
 
+    is_hidden = False
+
     def columns(self) -> list[list[tuple[Section, list[forms.BoundField], list[forms.BoundField]]]]:
-        """Return two columns of sections with their fields."""
+        """Return two columns of sections with their fields; a hidden split has a note on its quota."""
         return [
             [
-                (each, [self[name] for name in each.wide], [self[name] for name in each.short])
+                (
+                    each._replace(note=_KEEP_SMALL) if self.is_hidden and each.title == "Quota" else each,
+                    [self[name] for name in each.wide],
+                    [self[name] for name in each.short],
+                )
                 for each in column
             ]
             for column in self.layout
@@ -142,30 +149,33 @@ class NewSplitForm(PolicyForm):
 
     name = forms.CharField(
         max_length=32,
-        help_text="Small letters, digits and hyphens. Used in URLs; permanent.",
+        help_text="Lower-case letters, digits and hyphens. It appears in URLs and cannot be changed.",
         error_messages={"required": "No name was given; expected one like challenge-2027."},
         widget=forms.TextInput(attrs={"autocomplete": "off"}),
     )
     truth = forms.ChoiceField(
         label="Ground truth",
-        help_text="With its own ground truth, the split starts switched off: import the ground truth with "
-        "manage.py import_truth, then list the split. With that of another split, it has a board at once.",
+        widget=forms.RadioSelect,
+        initial="hidden",
+        help_text="With a new ground truth, the split starts switched off: import the ground truth with the "
+        "command import_truth, then list the split. With that of another split, its board exists at once.",
         error_messages={"required": "No ground truth was chosen; expected one of those listed."},
     )
 
     field_order = ("name", "title", "truth")
+    is_hidden = True
     layout = (
         (Section("Required", field_order), Section("Display", ("description",), _DISPLAY_FIELDS), _DATES),
-        (_ANNOUNCEMENT, Section("Quota", (), _QUOTA_FIELDS, _KEEP_SMALL), _ADMISSION),
+        (_ANNOUNCEMENT, Section("Quota", (), _QUOTA_FIELDS), _ADMISSION),
     )
 
     def __init__(self, data: Any = None, *, initial: Any = None) -> None:
         super().__init__(data, initial=initial)
         able = Split.objects.filter(same_truth_as=None).exclude(current_edition=None)
         self.fields["truth"].choices = [  # type: ignore[attr-defined]  # a ChoiceField
-            ("hidden", "its own, hidden"),
-            ("open", "its own, open"),
-            *((f"as {split.pk}", f"that of {split.title}, a challenge") for split in able),
+            ("hidden", "New, hidden"),
+            ("open", "New, open"),
+            *((f"as {split.pk}", f"That of {split.title} (a challenge)") for split in able),
         ]
 
     def wanted(self) -> dict[str, Any]:

@@ -57,6 +57,7 @@ def add(request: HttpRequest) -> HttpResponse:
 def change(request: HttpRequest, split: str) -> HttpResponse:
     split_row = get_object_or_404(Split, pk=split)
     form = PolicyForm.asked(request, initial=PolicyForm.filled_with(policy.policy_of(split_row)))
+    form.is_hidden = split_row.is_hidden
     if form.is_valid():
         with form.refusals():
             policy.change(split_name=split, policy=form.policy(), actor=maintainer_of(request))

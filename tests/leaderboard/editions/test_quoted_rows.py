@@ -172,7 +172,7 @@ def test_the_page_imports_a_paper_with_missing_values_and_says_where_every_probl
     document["results"]["test"]["later"][3] = None
     assert send(json.dumps(document).encode()).status_code == 302
     page = assert_sound(keeper.get(PAGE)).one("main").text
-    assert "always" in page
+    assert "the start" in page
     assert "Later" in page
     assert "Later" in keeper.get("/board/test/").text
     assert "@misc{ater2026later," in keeper.get("/board/test.bib").text
@@ -200,7 +200,7 @@ def test_the_page_imports_a_paper_with_missing_values_and_says_where_every_probl
 
 
 def test_the_example_on_the_page_can_be_pasted_as_it_is(keeper: Client, edition: Edition) -> None:
-    example = assert_sound(keeper.get(PAGE)).one("code", id="example").text
+    example = assert_sound(keeper.get(f"{PAGE}?form=paper")).one("code", id="example").text
     assert keeper.post(PAGE, {"text": example}).status_code == 302
     assert on_board()["Later"] == 14.0
 

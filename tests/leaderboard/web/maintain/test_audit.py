@@ -139,6 +139,32 @@ def test_events_have_names_and_links_and_the_words_of_people(
     }
 
 
+def test_an_evaluation_names_its_edition_and_why_its_file_was_rejected(
+    keeper: Client, edition: Edition, owner: User
+) -> None:
+    for method, data in (("Owl net", builders.predictions(edition)), ("Broken", b"{}")):
+        builders.submit(owner, data, method=method)
+    builders.score_all()
+    shown = {row[4]: row[5] for row in rows(keeper.get(PAGE)) if row[3] in {"scored", "rejected"}}
+    assert shown["Evaluation Owl net on Test"] == "edition: 1"
+    assert shown["Evaluation Broken on Test"].startswith("edition: 1 reason: ")
+
+
+def test_a_change_is_shown_from_what_to_what_and_fields_have_the_labels_of_the_form(
+    keeper: Client, owner: User
+) -> None:
+    audit.record(
+        verb="shown", noun="n", noun_id="1", actor=owner, details={"from": "PRIVATE", "to": "PUBLIC"}
+    )
+    audit.record(
+        verb="edited", noun="n", noun_id="1", actor=owner, details={"fields": ["n_frames", "paper_url"]}
+    )
+    assert [row[5] for row in rows(keeper.get(PAGE))] == [
+        "fields: frames used, paper link",
+        "private → public",
+    ]
+
+
 # --- the role of a maintainer ----------------------------------------------------------------------------
 
 

@@ -72,8 +72,8 @@ def test_desk_shows_each_split_with_its_board_and_what_is_prepared(keeper: Clien
 
 def test_desk_leads_to_what_failed_by_our_fault(keeper: Client, rescored: Edition) -> None:
     Evaluation.objects.filter(edition=rescored).update(status=Status.SYSTEM_ERROR)
-    link = next(a for a in get(keeper, HUB).all("a") if a.text == "inspect and retry")
-    assert "4 evaluations in edition 2: inspect and retry" in main_text(keeper, HUB)
+    link = next(a for a in get(keeper, HUB).all("a") if a.text == "Inspect and retry")
+    assert "4 evaluations in edition 2 Inspect and retry" in main_text(keeper, HUB)
     listed = get(keeper, link.attributes["href"])
     assert len(listed.one("table", class_="queue").one("tbody").all("tr")) == 4
 

@@ -125,6 +125,17 @@ def test_team_is_listed_by_name_by_look_and_by_its_people(
     assert address(team) in [a.attributes["href"] for a in root.all("a")]
 
 
+def test_a_maintainer_is_offered_only_what_the_rules_allow_on_the_own_account(
+    keeper: Client, maintainer: User, stranger: User
+) -> None:
+    listed = cells(get(keeper, TEAMS), "People without a team")
+    own, other = (next(row for row in listed if user.email in row[0]) for user in (maintainer, stranger))
+    assert own[0].endswith("you")
+    assert "Revoke tokens" in own[1]
+    assert not {word for word in ("Close account", "Forget person") if word in own[1]}
+    assert all(word in other[1] for word in ("Close account", "Revoke tokens", "Forget person"))
+
+
 def test_hub_leads_to_a_list_of_all_teams(keeper: Client, team: Team, stranger: User) -> None:
     other = teams.team_of(user=stranger)
     (tile,) = [li for li in get(keeper, "/maintain/").all("li") if li.text.startswith("Teams")]
