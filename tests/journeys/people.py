@@ -79,7 +79,8 @@ class Visitor:
 
     def text_of(self, path: str) -> str:
         """A page's words, without its markup."""
-        text = re.sub(r"<(script|style).*?</\1>|<[^>]+>", " ", self.get(path).text, flags=re.DOTALL)
+        marked = re.sub(r"</?strong>", "", self.get(path).text)  # inside of a sentence
+        text = re.sub(r"<(script|style).*?</\1>|<[^>]+>", " ", marked, flags=re.DOTALL)
         return re.sub(r"\s+", " ", html.unescape(text))
 
     def close(self) -> None:
