@@ -87,8 +87,8 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
     )
     rank = serializers.IntegerField(
         allow_null=True,
-        help_text="Rank of the method on the current board if this submission is its row there, else null; "
-        "of a private method the rank it would have. Its rank range is that of the first score.",
+        help_text="Rank of the method on the current board if this submission is its row there, else null. "
+        "For a private method: the rank that it would have. Its rank range is that of the first score.",
     )
     counts = CountsSerializer(
         allow_null=True, help_text="Number of sequences behind each mean; null: not scored yet."

@@ -37,7 +37,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "API guide": "api-guide",
         "API reference": "",
         "Exports": "exports",
-        "Permissions": "access",
+        "Teams, quotas, tokens": "access",
         "FAQ": "faq",
         "Compared with other leaderboards": "peers",
     },
