@@ -78,8 +78,8 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
     decimals = serializers.IntegerField(help_text="Decimals of the scores and confidence intervals.")
     intervals = serializers.DictField(
         child=UncertaintySerializer(),
-        help_text="Confidence intervals by score name, as on boards; empty until computed. A private "
-        "method has no rank range, nor has a submission that another one of its method surpasses.",
+        help_text="Confidence intervals by score name, as on boards; empty until computed. There "
+        "is no rank range for a private method, or for a submission that is not the best of its method.",
     )
     awaits_intervals = serializers.BooleanField(
         help_text="Whether the confidence intervals are being computed: they follow the scores within "
