@@ -97,7 +97,7 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     """A row of a board: scores by name, None where a TTC range has no value.
 
     `id` is permanent: a method's id, or `published:deep-scale`. `decimals` are those of its values.
-    `pseudonym` is the name that others see for an anonymous row of the own team, else None.
+    `pseudonym` is the name that others see for an anonymous row of your team, else None.
     """
 
     method: str
@@ -200,7 +200,7 @@ class Compared(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Quota(msgspec.Struct, frozen=True, kw_only=True):
-    """The own team's remaining submissions on a split; None is without limit."""
+    """Your team's remaining submissions to a split. None: no limit."""
 
     split: str
     document: JSON

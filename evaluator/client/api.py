@@ -102,7 +102,7 @@ class Client:
         self._http.close()
 
     def require_leaderboard(self) -> None:
-        """Raise ClientError for what is no leaderboard; the token is not sent."""
+        """Raise ClientError if the address is not a leaderboard; the token is not sent."""
         self.splits()
 
     def splits(self) -> list[str]:
@@ -191,7 +191,7 @@ class Client:
         return self._asked_by_anybody("splits", split, "manifest", accept="text/csv, */*", **query).content
 
     def quota(self) -> list[Quota]:
-        """Fetch the remaining submissions of the own team, by split."""
+        """Fetch your team's remaining submissions, by split."""
         return rows(self._asked("quota"), Quota)
 
     def compare(self, split: str, methods: Sequence[str], *, timeout_s: float = 120.0) -> Compared:
@@ -212,23 +212,23 @@ class Client:
             self.sleep(delay_s)
 
     def own_method(self, name_or_id: str) -> Method | None:
-        """Fetch the own team's method with this name or id."""
+        """Fetch your team's method with this name or id."""
         return next((row for row in self.methods() if name_or_id in {row.id, row.name}), None)
 
     def methods(self) -> Iterator[Method]:
-        """Fetch the own team's methods by name."""
+        """Fetch your team's methods by name."""
         return self._listed(Method, "methods")
 
     def submissions(self) -> Iterator[Submission]:
-        """List the own team's submissions, newest first."""
+        """List your team's submissions, newest first."""
         return self._listed(Submission, "submissions")
 
     def file(self, submission_id: str) -> bytes:
-        """Download the file of an own submission as it was sent."""
+        """Download the file of a submission of your team as it was sent."""
         return self._asked("submissions", submission_id, "file").content
 
     def withdraw(self, submission_id: str) -> Submission:
-        """Withdraw or cancel an own submission, for good."""
+        """Withdraw or cancel a submission of your team. This cannot be undone."""
         address = self._address("submissions", submission_id, "withdraw")
         return one(self._retry(lambda: self._http.post(address)), Submission)
 

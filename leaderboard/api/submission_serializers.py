@@ -78,8 +78,8 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
     decimals = serializers.IntegerField(help_text="Decimals of the scores and confidence intervals.")
     intervals = serializers.DictField(
         child=UncertaintySerializer(),
-        help_text="Confidence intervals by score name, as on boards; empty until computed. A private "
-        "method has no rank range, nor has a submission that another one of its method surpasses.",
+        help_text="Confidence intervals by score name, as on boards; empty until computed. There "
+        "is no rank range for a private method, or for a submission that is not the best of its method.",
     )
     awaits_intervals = serializers.BooleanField(
         help_text="Whether the confidence intervals are being computed: they follow the scores within "
@@ -87,8 +87,8 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
     )
     rank = serializers.IntegerField(
         allow_null=True,
-        help_text="Rank of the method on the current board if this submission is its row there, else null; "
-        "of a private method the rank it would have. Its rank range is that of the first score.",
+        help_text="Rank of the method on the current board if this submission is its row there, else null. "
+        "For a private method: the rank that it would have. Its rank range is that of the first score.",
     )
     counts = CountsSerializer(
         allow_null=True, help_text="Number of sequences behind each mean; null: not scored yet."

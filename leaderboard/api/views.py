@@ -54,7 +54,7 @@ class WithdrawView(APIView):
         responses={200: SubmissionSerializer, **errors(404, 422)},
     )
     def post(self, request: Request, submission_id: str) -> Response:
-        """Cancel a waiting submission; if it is published, its row stays without values. Cannot be undone."""
+        """Cancel a waiting or withdraw a scored submission, for good. A public row stays, without values."""
         submission = get_object_or_404(visible(request), pk=submission_id)
         now = timezone.now()
         intake.withdraw(submission=submission, actor=cast("User", request.user), now=now)
@@ -113,7 +113,7 @@ class CroissantView(APIView):
         responses={(200, "application/ld+json"): dict, **errors(404)},
     )
     def get(self, request: Request, split: str) -> JsonResponse:
-        """The manifest as a dataset that programs find and load by: Croissant 1.1 (JSON-LD)."""
+        """The manifest as Croissant 1.1 (JSON-LD), which programs can find and load."""
         text = request.query_params.get("edition")
         current = current_split(request, split).current_edition
         edition = published_edition(split, edition_number(text)) if text is not None else current

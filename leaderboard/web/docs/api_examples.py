@@ -73,7 +73,8 @@ class Example:
         token = ', token=os.environ["TSTTC_TOKEN"]' if self.call.has_token else ""
         imports = "import os\n\nimport evaluator\n\n" if token else "import evaluator\n\n"
         lines = self.python if "\n" in self.python else f"print({self.python})"
-        return f'{imports}with evaluator.Client(url="{site}"{token}) as client:\n{indent(lines, "    ")}'
+        where = f'\n    url="{site}"{token}\n' if token else f'url="{site}"'
+        return f"{imports}with evaluator.Client({where}) as client:\n{indent(lines, '    ')}"
 
 
 def _get(path: str, *query: tuple[str, str], has_token: bool = False) -> Call:

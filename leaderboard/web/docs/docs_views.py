@@ -3,6 +3,8 @@
 Most answer without the database. Long pages are compressed here: not every site has a proxy that does so.
 """
 
+from typing import Final
+
 from django.http import FileResponse, Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import render
 from django.urls import reverse
@@ -16,13 +18,29 @@ from leaderboard.pages import texts
 from leaderboard.pages.texts import PAGES
 from leaderboard.web import markdown
 from leaderboard.web.docs import api_examples, api_reference, guides, reference, search, wheels
+from leaderboard.web.docs.guides import GuideLink
+from leaderboard.web.markdown import TextHeading
+
+_CHAPTERS_OF_API: Final = [
+    TextHeading(2, "Operations", "operations"),
+    TextHeading(2, "Problem codes", "problems"),
+    TextHeading(2, "Objects", "shapes"),
+]
+
+
+def _navigation(address: str) -> list[tuple[str, list[GuideLink], bool]]:
+    """Return the sections of the navigation, and whether each is open: the page's own, or all without one."""
+    sections = guides.navigation()
+    has_page = [any(link.address == address for link in links) for _, links in sections]
+    is_in_one = any(has_page[1:])
+    return [(*section, has_it or not is_in_one) for section, has_it in zip(sections, has_page, strict=True)]
 
 
 @gzip_page
 @require_safe
 def docs(request: HttpRequest) -> HttpResponse:
     facts = reference.docs(splits_of(request), now=timezone.now())
-    context = {"navigation": guides.navigation(), "wheel": wheels.current(), **facts}
+    context = {"navigation": _navigation(request.path), "wheel": wheels.current(), **facts}
     return render(request, "docs/docs.html", context)
 
 
@@ -32,12 +50,13 @@ def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
     if guide_name not in guides.files():
         raise Http404(f"There is no guide {guide_name!r}.")
     before, after = guides.neighbours(guide_name)
+    above = reverse("guide", args=["decisions"]) if guide_name.startswith("adr/") else ""
     context = {
-        "navigation": guides.navigation(),
+        "navigation": _navigation(above or request.path),
         "guide": guides.guide(guide_name),
         "before": before,
         "after": after,
-        "above": reverse("guide", args=["decisions"]) if guide_name.startswith("adr/") else "",
+        "above": above,
     }
     return render(request, "docs/guide.html", context)
 
@@ -47,7 +66,7 @@ def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
 def find(request: HttpRequest) -> HttpResponse:
     query = " ".join(request.GET.get("q", "").replace("\x00", " ").split())[: search.MAX_QUERY]
     hits = search.find(query) if query else []
-    context = {"navigation": guides.navigation(), "query": query, "hits": hits}
+    context = {"navigation": _navigation(request.path), "query": query, "hits": hits}
     return render(request, "docs/search.html", context)
 
 
@@ -59,7 +78,7 @@ def api_operation(request: HttpRequest, operation_id: str) -> HttpResponse:
     if operation is None:
         raise Http404(f"There is no operation {operation_id!r}.")
     context = {
-        "navigation": guides.navigation(),
+        "navigation": _navigation(reverse("api_reference")),
         "operation": operation,
         "example": api_examples.shown(operation_id),
         "above": reverse("api_reference"),
@@ -70,7 +89,11 @@ def api_operation(request: HttpRequest, operation_id: str) -> HttpResponse:
 @gzip_page
 @require_safe
 def api_page(request: HttpRequest) -> HttpResponse:
-    context = {"navigation": guides.navigation(), "api": api_reference.reference()}
+    context = {
+        "navigation": _navigation(request.path),
+        "guide": {"chapters": _CHAPTERS_OF_API},
+        "api": api_reference.reference(),
+    }
     return render(request, "docs/api_reference.html", context)
 
 
@@ -89,7 +112,7 @@ def site_page(request: HttpRequest, page_name: str) -> HttpResponse:
 @require_safe
 def dist(request: HttpRequest) -> HttpResponse:
     wheel = wheels.current()
-    context = {"navigation": guides.navigation(), "wheel": wheel}
+    context = {"navigation": _navigation(request.path), "wheel": wheel}
     return render(request, "docs/install.html", context, status=200 if wheel else 404)
 
 

@@ -33,11 +33,12 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Prediction files": "file-format",
         "Command line": "cli",
         "Python": "python",
+        "Python reference": "python-reference",
         "CI": "ci",
         "API guide": "api-guide",
         "API reference": "",
         "Exports": "exports",
-        "Permissions": "access",
+        "Teams, quotas, tokens": "access",
         "FAQ": "faq",
         "Compared with other leaderboards": "peers",
     },
@@ -59,8 +60,8 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
     },
     "For developers": {"Overview": "overview", "Architecture": "architecture", "Decisions": "decisions"},
 }
-_PYTHON: Final = "python"
-"""The guide that the reference of the packages follows."""
+_PYTHON: Final = "python-reference"
+"""The guide that has the reference of the packages."""
 # Pages that a guide names by their paths, and that anybody may ask for.
 _PAGES: Final = frozenset(
     (

@@ -1,16 +1,17 @@
-"""The reference of the Python packages, as Markdown below the guide `docs/python.md`.
+"""The reference of the Python packages, as Markdown below the guide `docs/python-reference.md`.
 
 It reads the sources and imports nothing: a server has neither OpenCV nor torch, which some modules need.
 """
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Final
 
 from django.conf import settings
+from django.utils.text import slugify
 
 _ROOT: Final = Path(settings.BASE_DIR)
 _MAX_WIDTH: Final = 88
@@ -56,15 +57,23 @@ _Definition = ast.FunctionDef | ast.ClassDef
 
 def text() -> str:
     """The reference of both packages as Markdown."""
-    parts = ["## Reference: evaluator", "", "Import these names from `evaluator`.", ""]
-    for name, module in sorted(_homes().items(), key=lambda each: each[0].lower()):
+    homes = sorted(_homes().items(), key=lambda each: each[0].lower())
+    parts = ["## evaluator", "", "Import these names from `evaluator`:", ""]
+    parts += [_index("evaluator", [name for name, _ in homes]), ""]
+    for name, module in homes:
         parts += _entry(name, module, shown=f"evaluator.{name}")
     for title, modules in SECTIONS.items():
-        parts += [f"## Reference: {title}", "", "Each name belongs to the module before it.", ""]
+        parts += [f"## {title[0].upper()}{title[1:]}", "", "Each name belongs to the module before it:", ""]
+        parts += [", ".join(_index(module, names) for module, names in modules.items()), ""]
         for module, names in modules.items():
             for name in names:
                 parts += _entry(name, module, shown=f"{module}.{name}")
     return "\n".join(parts)
+
+
+def _index(module: str, names: Sequence[str]) -> str:
+    """Links to the names of a module."""
+    return ", ".join(f"[`{name}`](#{slugify(f'{module}.{name}')})" for name in names)
 
 
 def _homes() -> dict[str, str]:
@@ -117,7 +126,8 @@ def _members(node: ast.ClassDef) -> Iterator[str]:
         marks = {ast.unparse(mark).rpartition(".")[2] for mark in each.decorator_list}
         call = each.name if marks & {"property", "cached_property"} else f"{each.name}{_call(each)}"
         about = (ast.get_docstring(each) or "").partition("\n\n")[0].replace("\n", " ")
-        lines.append(f"- `{call}`: {about}")
+        # An arrow of two signs would break between them on a phone.
+        lines.append(f"- `{call.replace(' -> ', ' → ')}`: {about}")
     yield from lines
     if lines:
         yield ""

@@ -14,7 +14,7 @@ MAX_HITS: Final = 12
 _MAX_COUNT: Final = 8
 _SNIPPET: Final = 200
 # Pages of names, where a word is often a name: what explains it comes first.
-_REFERENCES: Final = frozenset({"cli", "python"})
+_REFERENCES: Final = frozenset({"cli", "python-reference"})
 _WORD: Final = re.compile(r"[^\W_]+")
 # A longer word also finds what begins with it: "quot" finds "quota", but "to" does not find "token".
 _MAX_SHORT: Final = 3

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from evaluator import receipts
-from evaluator.metrics.protocol import SCORE_NAMES
+from evaluator.metrics.protocol import PROTOCOLS, SCORE_NAMES
 from evaluator.papers.tables import published_tables
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY
@@ -32,7 +32,10 @@ METHOD_ID = "5d2c1f8e-0b7a-4c36-9f41-7a3e6b9d2c10"
 
 Run = Callable[[str], str]
 
-VALUES = [13.92, 26.11, 15.02, 10.71, 13.18, 11.84, 6.21, 8.39, 12.77, 14.36]
+# A hidden split has one decimal and no warning error, an open one has two decimals and the warning error.
+ON_TEST = [13.9, 26.1, 15.0, 10.7, 13.2, 11.8, 6.2, 8.4, 12.8, 14.4]
+ON_VAL = [13.92, 26.11, 15.02, 10.71, 13.18, 11.84, 6.21, 8.39, 12.77, 14.36, 2.95, 12.84, 5.91, 0.42, 0.88]
+OPEN = PROTOCOLS["tsttc-2"]
 COUNTS = {"overall": 28_600, "crucial": 3_832, "small": 3_775, "large": 12_470, "negative": 8_523}
 _SEED = bytes(range(32))  # of a key that signs nothing but this example
 RECEIPT_KEYS = receipts.key_set([receipts.public_key(_SEED)])
@@ -42,11 +45,11 @@ RECEIPT = receipts.sign(
         "submission": ID,
         "split": "val",
         "edition": 2,
-        "protocol": "tsttc-1",
+        "protocol": OPEN.name,
         "ground_truth": "sha256:" + "9f" * 32,
         "file": "sha256:" + "1c" * 32,
         "method": {"id": METHOD_ID, "name": "Foo++"},
-        "scores": {name: f"{value:.2f}" for name, value in zip(SCORE_NAMES, VALUES, strict=True)},
+        "scores": {name: f"{value:.2f}" for name, value in zip(OPEN.score_names, ON_VAL, strict=True)},
         "counts": COUNTS,
         "scored_at": "2026-11-20T12:00:00Z",
     },
@@ -141,7 +144,7 @@ def put_documented_answers(site: RecordedSite) -> None:
         "problems": [],
         "n_problems": 0,
     }
-    scores = dict(zip(SCORE_NAMES, VALUES, strict=True))
+    scores = dict(zip(OPEN.score_names, ON_VAL, strict=True))
     unranked = {"rank_low": None, "rank_high": None, "is_with_best": None}  # as of every private method
     scored = submission | {
         "state": "SCORED",
@@ -150,6 +153,7 @@ def put_documented_answers(site: RecordedSite) -> None:
         "intervals": {
             "mid": {"low": 13.21, "high": 14.60, **unranked},
             "rte": {"low": 11.18, "high": 12.52, **unranked},
+            "warning": {"low": 2.61, "high": 3.31, **unranked},
         },
         "awaits_intervals": False,
         "rank": 1,
@@ -172,7 +176,8 @@ def put_documented_answers(site: RecordedSite) -> None:
     running = submission | {"state": "RUNNING", "queue": None}
     site.put(f"GET /api/v1/submissions/{ID}", Reply(submission), Reply(running), Reply(scored))
     site.put(f"GET /api/v1/submissions/{REJECTED_ID}", Reply(rejected))
-    site.put("GET /api/v1/splits/test/board", Reply(published_board("test", scores)))
+    on_test = dict(zip(SCORE_NAMES, ON_TEST, strict=True))
+    site.put("GET /api/v1/splits/test/board", Reply(published_board("test", on_test)))
     site.put("GET /api/v1/splits/val/board", Reply(published_board("val", scores)))
     unknown = problem("There is nothing at this address that you may see.", code="not-found")
     site.put("GET /api/v1/splits/trial/board", Reply(unknown, status=404))
@@ -198,7 +203,7 @@ def put_more_documented_answers(site: RecordedSite) -> None:
         name: significant
         if name in {"mid", "mid_crucial", "rte"}
         else significant | {"low": -2.9, "high": 0.54, "p": 0.17}
-        for name in SCORE_NAMES
+        for name in OPEN.score_names
     }
     sentence = (
         "The MiD of Foo++ is 1.18 lower than that of Bar "
@@ -231,18 +236,18 @@ def published_board(split: str, scores: Mapping[str, float]) -> dict[str, object
     ]
     entries.append(
         {"method": "Foo++", "team": "TJU-V", "date": "2026-11-20", "kind": "submission", "scores": scores}
-        | {"method_id": METHOD_ID}
+        | {"decimals": 1 if split == "test" else 2, "method_id": METHOD_ID}
     )
     if split == "val":
         worse = {name: round(value + 1.18, 2) for name, value in scores.items()}
         row = {"method": "Bar", "team": "Owls", "date": "2026-11-18", "kind": "submission", "scores": worse}
-        entries.append(row | {"method_id": REJECTED_ID})
+        entries.append(row | {"decimals": 2, "method_id": REJECTED_ID})
     entries.sort(key=lambda entry: entry["scores"]["mid"])
     ranked = [{"rank": rank, **entry} for rank, entry in enumerate(entries, start=1)]
     return {
         "split": split,
         "edition": 2,
-        "protocol": "tsttc-1",
+        "protocol": "tsttc-1" if split == "test" else OPEN.name,
         "ground_truth": "sha256:" + "9f" * 32,
         "n_sequences": COUNTS["overall"],
         "n_recordings": 120,

@@ -26,6 +26,8 @@ def test_every_page_of_the_documentation_has_the_navigation_and_marks_where_one_
             e for e in pages.get(client, address).all("nav") if e.attributes["aria-label"] == "Documentation"
         )
         assert [a.attributes["href"] for a in nav.all("a") if "aria-current" in a.attributes] == [address]
+        n_open = sum("open" in group.attributes for group in nav.all("details"))
+        assert n_open == (4 if address == "/docs/" else 1)
         listed = {a.attributes["href"] for a in nav.all("a")}
         assert {
             "/docs/researchers/",

@@ -29,8 +29,11 @@ def test_arguments_are_those_of_the_function() -> None:
     assert "timeout_s: float = 15.0,\n    retry_policy: RetryPolicy = …," in ENTRIES["evaluator.Client"]
 
 
-def test_guide_ends_with_the_reference() -> None:
-    page = guides.guide("python")
+def test_the_page_has_the_reference_and_begins_each_part_with_links_to_its_names() -> None:
+    page = guides.guide("python-reference")
     chapters = [heading.text for heading in page.chapters]
-    assert chapters[0] == "Score a file"
-    assert chapters[-1] == "Reference: starter kit"
+    assert (chapters[0], chapters[-1]) == ("evaluator", "Starter kit")
+    anchors = {part.heading.anchor for part in page.parts}
+    links = set(re.findall(r"\]\(#([\w-]+)\)", TEXT))
+    assert len(links) == len(ENTRIES)
+    assert links <= anchors
