@@ -40,10 +40,10 @@ def test_the_leaders_are_the_first_rows_of_the_main_board(client: Client, benchm
 def test_each_ttc_range_names_its_leaders_and_their_value(client: Client, benchmark: None) -> None:
     rows = [[cell.text for cell in row.all("th") + row.all("td")] for row in _range_rows(client)]
     assert rows == [
-        ["0–3 s", "Deep Scale", "27.6"],
-        ["3–6 s", "Deep Scale and Deep Scale (NeRF)", "15.6"],
-        ["6–20 s", "Deep Scale and Deep Scale (NeRF)", "11.5"],
-        ["−20–0 s", "Deep Scale", "13.7"],
+        ["0–3 s crucial", "Deep Scale", "27.6"],
+        ["3–6 s small", "Deep Scale and Deep Scale (NeRF)", "15.6"],
+        ["6–20 s large", "Deep Scale and Deep Scale (NeRF)", "11.5"],
+        ["−20–0 s negative", "Deep Scale", "13.7"],
     ]
 
 
