@@ -43,7 +43,7 @@ def changed_rows(board: Board) -> list[ChangedRow]:
 def _words(change: Change) -> str:
     before, after = change.before, change.after
     if after is None:
-        return "no longer on the board"
+        return "removed"
     if after.withdrawn_at:
         return "withdrawn"
     if before is None:

@@ -89,6 +89,8 @@ def scale_of(values: Iterable[float], intervals: Iterable[Ends], *, best: Ends |
 
     >>> scale_of([10.0, 11.0, 12.0, 13.0, 900.0], [(9.5, 10.5)], best=(9.5, 10.5))
     WhiskerScale(low=9.5, high=13.0, best=(9.5, 10.5))
+    >>> scale_of([2.0, 3.0, 5.0, 20.0, 56.0], [], best=None)
+    WhiskerScale(low=2.0, high=56.0, best=None)
     """
     ordered, ends = sorted(values), list(intervals)
     if len(ordered) < 2:
