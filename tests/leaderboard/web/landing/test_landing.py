@@ -86,6 +86,18 @@ def test_its_one_filled_button_leads_to_a_split_that_is_open(client: Client, edi
     assert filled_buttons(client) == []
 
 
+def test_editions_are_linked_of_a_split_that_has_one(client: Client, edition: Edition) -> None:
+    assert links_of_trust(client)["Editions and changelog"] == "/board/test/editions/"
+    Split.objects.filter(pk="demo").update(current_edition=edition)
+    Split.objects.filter(pk="test").update(current_edition=None)
+    builders.board_changed("test")
+    assert links_of_trust(client)["Editions and changelog"] == "/board/demo/editions/"
+
+
+def links_of_trust(client: Client) -> dict[str, str | None]:
+    return {each.text: each.attributes["href"] for each in panel(client, "trust").all("a")}
+
+
 def test_what_one_downloads_to_submit_is_one_click_away(client: Client, edition: Edition) -> None:
     links = {
         each.text: each.attributes["href"] for each in landing(client).one("div", class_="hero").all("a")
