@@ -36,7 +36,6 @@
   const CALLS = {
     name: () => (mark) => mark.data.name,
     text: () => (mark) => mark.data.text,
-    rank: () => (name) => name.split(" ")[0],
     number: () => (value) => String(value).replace("-", "−"),
     texts: (places) => (value) => places.find(([place]) => Math.abs(place - value) < 1e-6)?.[1] ?? "",
     // A name begins below its mark. It moves to the left where it would cross the next step or leave the drawing,

@@ -43,12 +43,17 @@ def changed_rows(board: Board) -> list[ChangedRow]:
 def _words(change: Change) -> str:
     before, after = change.before, change.after
     if after is None:
-        return "no longer on the board"
+        return "removed"
     if after.withdrawn_at:
         return "withdrawn"
     if before is None:
         return "new"
-    return "another value" if before.value != after.value else "another rank"
+    if before.value != after.value:
+        return "another value"
+    if before.rank is None or after.rank is None:
+        return "another rank"
+    n_down = after.rank - before.rank
+    return f"down {n_down}" if n_down > 0 else f"up {-n_down}"
 
 
 def _then_now(change: Change, text: Callable[[Entry], str]) -> str:

@@ -101,6 +101,7 @@ class Cell:
 class Group:
     """A metric over its columns."""
 
+    name: str
     title: str
     symbol: str
     unit: str
@@ -131,6 +132,7 @@ def score_groups(names: Iterable[str], *, n_whiskers: int = 0) -> tuple[Group, .
     """Group scores by metric; the first has the whiskers' columns as well."""
     return tuple(
         Group(
+            name=metric.title,
             title=f"{metric.title} ({metric.symbol})",
             symbol=metric.symbol,
             unit=metric.unit,

@@ -12,15 +12,15 @@ from typing import Final
 from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
 
-# Rows whose value lies beyond this share of all values need not be on the scale.
+# Off the scale are outliers: values so many times larger than the last of most, this share of all values.
 _MOST: Final = 0.8
-_ROOM: Final = 1.25
+_ROOM: Final = 5.0
 # A scale that spans more than this factor is logarithmic, so that the leading rows do not share one pixel.
 _LOG_FROM: Final = 2.5
 # Room for the marks and labels at both ends, which would else touch the next column.
-_MARGIN: Final = 10.0
+_MARGIN: Final = 15.0
 # Two labels of an axis stand at least so far apart.
-_LABEL_GAP: Final = 24.0
+_LABEL_GAP: Final = 21.0
 _STEPS: Final = (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 
 _TICK: Final = '<line class="tick" x1="{0}%" x2="{0}%" y1="32%" y2="68%"/>'
@@ -85,15 +85,16 @@ class WhiskerScale:
 
 
 def scale_of(values: Iterable[float], intervals: Iterable[Ends], *, best: Ends | None) -> WhiskerScale | None:
-    """Make a scale that shows most of these values; None for fewer than two.
+    """Make a scale that shows these values but outliers; None for fewer than two.
 
     >>> scale_of([10.0, 11.0, 12.0, 13.0, 900.0], [(9.5, 10.5)], best=(9.5, 10.5))
     WhiskerScale(low=9.5, high=13.0, best=(9.5, 10.5))
+    >>> scale_of([2.0, 3.0, 5.0, 20.0, 56.0], [], best=None)
+    WhiskerScale(low=2.0, high=56.0, best=None)
     """
     ordered, ends = sorted(values), list(intervals)
     if len(ordered) < 2:
         return None
-    # A little beyond the last of most: a row that ends close to it is shown as well.
     limit = _ROOM * ordered[math.ceil(_MOST * len(ordered)) - 1]
     low = min([ordered[0], *(low for low, _ in ends)])
     high = max(value for value in [*ordered, *(high for _, high in ends)] if value <= limit)

@@ -102,8 +102,10 @@ def _front_series(
             continue
         names.append(name)
         behind = [each.mark("", metric) for each in of_kind if not each.is_front]
-        drawn_behind = marks(name, behind, Look("--quiet", symbol, 9.0, is_hollow=True))
-        if len(points) <= _FEW_POINTS:
+        # A few are so large that one with the same place as a mark of the front is seen around it.
+        is_few = len(points) <= _FEW_POINTS
+        drawn_behind = marks(name, behind, Look("--quiet", symbol, 17.0 if is_few else 9.0, is_hollow=True))
+        if is_few:
             drawn_behind["label"] = {**TEXT, "show": True, "position": "top", "formatter": call("name")}
         series.append(drawn_behind)
         ahead = [i for i, each in enumerate(front) if each.entry.kind == kind]

@@ -15,7 +15,7 @@ _MAX_NAMED: Final = 2
 
 
 def range_leaders(board: Board) -> list[tuple[str, str, str]]:
-    """Return ends, leading methods and lowest value of each TTC range that has a value."""
+    """Return ends with name, leading methods and lowest value of each TTC range that has a value."""
     rules, rows = board.rules, []
     ranked = [entry for entry in board.entries if entry.rank is not None and entry.is_visible_to_all]
     for name in rules.names_of(rules.primary.name):
@@ -23,7 +23,9 @@ def range_leaders(board: Board) -> list[tuple[str, str, str]]:
         ttc_range = range_of(name)
         if ttc_range is not None and first:
             value = format_rounded(first[0].scores[name], decimals=first[0].decimals)
-            rows.append((ttc_range.seconds, listed([entry.method for entry in first]), value))
+            rows.append(
+                (f"{ttc_range.seconds} {ttc_range.name}", listed([entry.method for entry in first]), value)
+            )
     return rows
 
 

@@ -15,11 +15,11 @@ from evaluator.tables.sentences import p_cell
 from leaderboard.boards.rows import Entry
 from leaderboard.models import Visibility
 from leaderboard.statistics.comparisons import Pair
-from leaderboard.web.charts.chart_options import Chart, Frame, Mark, Option, call, empty, ranks_axis
+from leaderboard.web.charts.chart_options import TEXT, Chart, Frame, Mark, Option, call, empty, ranks_axis
 from leaderboard.web.charts.chart_series import cells
 from leaderboard.web.formatting import signed
 
-_FEW, _FEW_ON_A_PHONE = 8, 7
+_FEW, _FEW_ON_A_PHONE = 8, 6
 _MAX_NAMED: Final = 3
 SIGNIFICANT: Final = {0.001: "p < 0.001", 0.01: "p < 0.01", 0.05: "p < 0.05"}
 UNDECIDED, COMPUTING = "not significant", "computing…"
@@ -100,9 +100,12 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
             [{"label": {"show": len(entries) <= _FEW_ON_A_PHONE}} for _ in verdicts],
         ),
         names=verdicts,
-        # On a phone the rank names a row: names cut to their beginnings would be alike.
-        left=(220, 36),
-        y_labels_by_width=({"formatter": "{value}"}, {"formatter": call("rank")}),
+        # On a phone names have two lines: cut to their beginnings they would be alike.
+        left=(220, 136),
+        y_labels_by_width=(
+            TEXT | {"overflow": "truncate"},
+            {"overflow": "break", "fontSize": 10, "lineHeight": 11},
+        ),
         top=30,
     )
     return Chart(

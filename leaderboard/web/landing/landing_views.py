@@ -36,7 +36,7 @@ def home(request: HttpRequest) -> HttpResponse:
         "facts": [*_counts(in_order), *settings.BENCHMARK.landing.facts, *_ranges(main)],
         "dates": _dates(splits, reader=request.user, now=now),
         "news": latest(splits),
-        "board_split": main.pk if main else "",
+        "edition_split": next((split.pk for split in in_order if split.current_edition), ""),
     }
     return render(request, "landing/home.html", context | (_leading(main, now=now) if main else {}))
 

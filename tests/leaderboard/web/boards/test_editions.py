@@ -122,10 +122,10 @@ def test_past_board_lists_what_has_changed_since(
     changed = [
         (row.one("th").text, *(cell.text for cell in row.all("td"))) for row in section.one("tbody").all("tr")
     ]
-    assert [row[:3] for row in changed[:2]] == [("New", "new", "1"), ("M1.05", "another rank", "1 → 2")]
+    assert [row[:3] for row in changed[:2]] == [("New", "new", "1"), ("M1.05", "down 1", "1 → 2")]
     assert changed[-1][:2] == ("M1.1", "withdrawn")
     assert changed[-1][2].endswith(" → –")
-    assert "Deep Scale" in {row[0] for row in changed if row[1] == "another rank"}
+    assert "Deep Scale" in {row[0] for row in changed if row[1] == "down 1"}
     assert get(client, "/board/test/").all("section", **{"aria-labelledby": "changes"}) == []
 
 

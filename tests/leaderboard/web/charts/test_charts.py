@@ -155,7 +155,12 @@ def test_leaders_by_range_stand_below_their_chart_as_a_table(
 ) -> None:
     root = get(client, "/board/test/charts/")
     leads = root.one("section", **{"aria-labelledby": "leaders"}).one("tbody")
-    assert [row.one("th").text for row in leads.all("tr")] == ["0–3 s", "3–6 s", "6–20 s", "−20–0 s"]
+    assert [row.one("th").text for row in leads.all("tr")] == [
+        "0–3 s crucial",
+        "3–6 s small",
+        "6–20 s large",
+        "−20–0 s negative",
+    ]
     assert leads.text == get(client, "/").one("table", class_="attempts-list").one("tbody").text
 
 

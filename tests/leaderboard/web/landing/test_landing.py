@@ -40,10 +40,10 @@ def test_the_leaders_are_the_first_rows_of_the_main_board(client: Client, benchm
 def test_each_ttc_range_names_its_leaders_and_their_value(client: Client, benchmark: None) -> None:
     rows = [[cell.text for cell in row.all("th") + row.all("td")] for row in _range_rows(client)]
     assert rows == [
-        ["0–3 s", "Deep Scale", "27.6"],
-        ["3–6 s", "Deep Scale and Deep Scale (NeRF)", "15.6"],
-        ["6–20 s", "Deep Scale and Deep Scale (NeRF)", "11.5"],
-        ["−20–0 s", "Deep Scale", "13.7"],
+        ["0–3 s crucial", "Deep Scale", "27.6"],
+        ["3–6 s small", "Deep Scale and Deep Scale (NeRF)", "15.6"],
+        ["6–20 s large", "Deep Scale and Deep Scale (NeRF)", "11.5"],
+        ["−20–0 s negative", "Deep Scale", "13.7"],
     ]
 
 
@@ -84,6 +84,18 @@ def test_its_one_filled_button_leads_to_a_split_that_is_open(client: Client, edi
     Split.objects.filter(pk="demo").update(current_edition=None)
     builders.board_changed("demo")
     assert filled_buttons(client) == []
+
+
+def test_editions_are_linked_of_a_split_that_has_one(client: Client, edition: Edition) -> None:
+    assert links_of_trust(client)["Editions and changelog"] == "/board/test/editions/"
+    Split.objects.filter(pk="demo").update(current_edition=edition)
+    Split.objects.filter(pk="test").update(current_edition=None)
+    builders.board_changed("test")
+    assert links_of_trust(client)["Editions and changelog"] == "/board/demo/editions/"
+
+
+def links_of_trust(client: Client) -> dict[str, str | None]:
+    return {each.text: each.attributes["href"] for each in panel(client, "trust").all("a")}
 
 
 def test_what_one_downloads_to_submit_is_one_click_away(client: Client, edition: Edition) -> None:
