@@ -26,8 +26,8 @@ OF_OTHERS = Protocol(
     "others-1", limit_s=30.0, near_zero_s=None, ranges=(APPROACHING, LEAVING), metrics=(RTE,)
 )
 WRONG = re.compile(r"\bMiD\b|(?i:motion-in-depth)|\bmid\b|mid_|crucial|0–3|(?i:ten (?:numbers|scores))|10⁻⁴")
-# The paper's own tables, guides about TSTTC, what the API has for all protocols, the wheel, other splits, and the
-# form that chooses among all protocols, each with its scores.
+# The paper's own tables, guides about TSTTC, what the API has for all protocols, the wheel, other splits, and
+# the form that chooses among all protocols, each with its scores.
 ELSEWHERE = re.compile(
     r"^/(maintain/)?published|^/docs/(?!$)|^/dist/.|^/api/v1/(published|schema|docs)|/(val|demo)\b|^/maintain/(audit|test/open)|=(val|demo)\b"
 )

@@ -159,7 +159,7 @@ def test_pages_answers_and_exports_say_which_unit_it_is(client: Client, tmp_path
         assert response.status_code == 200, address
         return pages.page(response).one("main").text
 
-    assert "95% confidence intervals (bootstrap over 32 days)" in words("/board/test/")
+    assert "95% confidence interval (bootstrap over 32 days)" in words("/board/test/")
     assert "32 days: treated as independent in confidence intervals" in words("/board/test/editions/1/")
     method = words(f"/methods/{sent[0].method_id}/").replace("\xa0", " ")
     assert "Intervals and rank ranges: 95% confidence, over 32 days." in method
