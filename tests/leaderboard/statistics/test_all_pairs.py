@@ -49,7 +49,12 @@ def compared(
     [
         (0.001, 0.001, "It is significantly better than the other two (all 3 pairs tested together)."),
         (0.4, 0.4, "It is not significantly better than the other two (all 3 pairs tested together)."),
-        (0.4, 0.001, "It is significantly better than C, and not significantly better than B (all 3 pairs tested together)."),
+        (
+            0.4,
+            0.001,
+            "It is significantly better than C, and not significantly better than B "
+            "(all 3 pairs tested together).",
+        ),
     ],
 )
 def test_the_best_of_three_is_named_with_those_that_it_is_significantly_better_than(
@@ -67,15 +72,24 @@ def test_a_p_that_is_small_among_three_by_chance_names_no_winner() -> None:
 def test_a_class_of_p_counts_as_its_upper_end() -> None:
     """On a hidden split p < 0.01 is all that is known: enough for three methods, not for four."""
     three = compared(None, None, None, below=(0.01, 0.01, 1.0))
-    assert "It is significantly better than the other two (all 3 pairs tested together)." in compare_tables.verdict(three)
+    assert (
+        "It is significantly better than the other two (all 3 pairs tested together)."
+        in compare_tables.verdict(three)
+    )
     four = compared(*[None] * 6, entries=(A, B, C, replace(C, method="D")), below=(0.01, 0.01, 0.01, 1, 1, 1))
-    assert "It is not significantly better than the other three (all 6 pairs tested together)." in compare_tables.verdict(four)
+    assert (
+        "It is not significantly better than the other three (all 6 pairs tested together)."
+        in compare_tables.verdict(four)
+    )
 
 
 def test_no_method_is_called_worse_that_the_board_marks_as_possibly_best() -> None:
     entries = with_range(A, 1, 2), with_range(B, 1, 3), with_range(C, 2, 3)
     sentence = compare_tables.verdict(compared(0.001, 0.001, 0.5, entries=entries))
-    assert sentence.endswith("It is significantly better than C, and not significantly better than B (all 3 pairs tested together).")
+    assert sentence.endswith(
+        "It is significantly better than C, and not significantly better than B "
+        "(all 3 pairs tested together)."
+    )
 
 
 def test_methods_with_separate_rank_ranges_on_the_board_are_separate() -> None:

@@ -163,8 +163,8 @@ def test_the_page_says_on_how_few_recordings_the_difference_rests(
     builders.infer_all()
     sentence = get(client, *ids).one("p", class_="influence").text
     assert re.fullmatch(
-        r"How robust is this\? Without the \d+ of \d+ recordings on which M1.05 leads most, the difference is "
-        r"no longer significant\.( Without \d+ such recordings, M\S+ is better\.)?",
+        r"How robust is this\? Without the \d+ of \d+ recordings on which M1.05 leads most, the difference "
+        r"is no longer significant\.( Without \d+ such recordings, M\S+ is better\.)?",
         sentence,
     ), sentence
 
