@@ -116,10 +116,10 @@ def influence(first: str, second: str, *, difference: Difference) -> str:
     >>> from evaluator.scoring.significance import Influence
     >>> difference = Difference(-0.4, -0.5, -0.2, 0.0003, influence=Influence(700, 39, 59))
     >>> print(influence("A", "B", difference=difference))
-    Leave out the 39 of 700 recordings that most favour A, and the difference is no longer significant; \
-leave out 59, and B is better.
+    Without the 39 of 700 recordings on which A leads most, the difference is no longer significant. \
+Without 59 such recordings, B is better.
     >>> influence("A", "B", difference=Difference(0.1, -0.2, 0.4, 0.4, influence=Influence(700, None, 2)))
-    'Leave out the 2 of 700 recordings that most favour B, and A is better.'
+    'Without the 2 of 700 recordings on which B leads most, A is better.'
     """
     known = difference.influence
     if known is None or not difference.difference:
@@ -128,11 +128,14 @@ leave out 59, and B is better.
     few, turn = known.n_to_undecided, known.n_to_turn
     if few is None and turn is None:
         return ""
-    of_all = f"of {in_words(difference.unit, known.n_units)} that most favour {better}"
+    of_all = f"of {in_words(difference.unit, known.n_units)} on which {better} leads most"
     if few is None:
-        return f"Leave out the {turn:,} {of_all}, and {worse} is better."
-    head = f"Leave out the {few:,} {of_all}, and the difference is no longer significant"
-    return f"{head}." if turn is None else f"{head}; leave out {turn:,}, and {worse} is better."
+        return f"Without the {turn:,} {of_all}, {worse} is better."
+    head = f"Without the {few:,} {of_all}, the difference is no longer significant."
+    if turn is None:
+        return head
+    such = in_words(difference.unit, turn).replace(" ", " such ")
+    return f"{head} Without {such}, {worse} is better."
 
 
 def selection(n_tried: Mapping[str, int]) -> str:

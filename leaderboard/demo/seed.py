@@ -36,8 +36,8 @@ TEAMS = {
 _PERSON = "Robin Larsen"
 _PAPER = "https://arxiv.org/abs/2309.01539"
 _RENDERED = (
-    "The frames are rendered, not filmed. Rendered vehicles are flat: they do not turn, shine or bend, "
-    "so methods that compare brightness look better than they are."
+    "The frames are rendered, not filmed. Rendered vehicles are flat and do not turn or reflect light. "
+    "So methods that compare brightness score better here than on real images."
 )
 
 
@@ -142,8 +142,8 @@ ENTRIES = (
         team="Baselines on pixels",
         method="Deep Scale features, own fit",
         description=(
-            "This project's own fit on features of the paper's network, not the paper's estimator. The "
-            "weights come with this project and were trained on other rendered sequences, and on nothing "
+            "We use the features of the paper's network, but our own fit instead of the paper's estimator. "
+            "The weights come with this project and were trained on other rendered sequences, and on nothing "
             "else: expect larger errors on real footage."
         ),
         run=get_run("deep-scale"),
@@ -153,8 +153,8 @@ ENTRIES = (
         team="Baselines on pixels",
         method="Deep Scale, our weights",
         description=(
-            "The paper's network with its own estimator, the head, and the weights that come with this "
-            "project. They were trained on other rendered sequences, and on nothing else."
+            "The paper's network with its own output layer (the head). The weights come from this project. "
+            "They were trained on other rendered sequences, and on nothing else."
         ),
         run=get_run("deep-scale-head"),
         details=_measured(2, n_parameters=83_832, paper_url=_PAPER),

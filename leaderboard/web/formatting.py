@@ -106,13 +106,14 @@ def _paragraph(text: str) -> SafeString:
 
 
 def with_bold_names(sentence: str, names: Collection[str]) -> SafeString:
-    """Set the names of methods off in a sentence, which their commas would break.
+    """Set the names of methods off in a sentence, which their commas would break, and keep p with its value.
 
     >>> with_bold_names("A, fast is 4 lower than B. <", ["B", "A", "A, fast"])
     '<b>A, fast</b> is 4 lower than <b>B</b>. &lt;'
     """
     choices = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
     parts = re.split(rf"(?<!\w)({choices})(?!\w)", sentence)
+    parts[::2] = [re.sub(r"\bp ([=≤<≥]) (?=\d)", "p\u00a0\\1\u00a0", part) for part in parts[::2]]
     return _alternating(parts, "<b>{}</b>")
 
 

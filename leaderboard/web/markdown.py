@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from typing import Final
 
 from django.utils.safestring import SafeString
@@ -114,7 +115,24 @@ def page(text: str) -> Document:
     for token in _inline(tokens):
         if "href" in token.attrs and not _TARGET.match(str(token.attrs["href"])):
             token.attrSet("href", "#")
+    _label_cells(tokens)
     return _document(tokens, parser, table=_TABLE.replace('"list"', '"list cards"'))
+
+
+def _label_cells(tokens: Sequence[Token]) -> None:
+    """Give each cell but a row's first the head of its column, which a phone shows beside it."""
+    heads, column = list[str](), 0
+    for token, inline in pairwise(tokens):
+        if token.type == "thead_open":
+            heads = []
+        elif token.type == "tr_open":
+            column = 0
+        elif token.type == "th_open":
+            heads.append(_plain(inline))
+        elif token.type == "td_open":
+            if column and heads[column]:
+                token.attrSet("data-label", heads[column])
+            column += 1
 
 
 @cache

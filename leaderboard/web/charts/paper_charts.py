@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
+from itertools import chain
 from typing import Final
 
 from django.conf import settings
@@ -155,18 +156,20 @@ def _with_best(shown: PrintedTable) -> list[tuple[PrintedRow, frozenset[int]]]:
 def published_page(request: HttpRequest) -> HttpResponse:
     if not settings.BENCHMARK.has_paper_tables:
         raise Http404("This benchmark has no tables of a paper.")
-    printed = published.printed_tables()
+    groups = _groups(published.printed_tables())
     context = {
         "tables": [
             {
                 "shown": each,
                 "chart": sweep(each),
-                "rows": _with_best(each),
+                "rows": [
+                    (row, zip(each.headings, row.cells, strict=True), best) for row, best in _with_best(each)
+                ],
                 "notes": [note.partition(_WHY)[::2] for note in each.table.notes],
             }
-            for each in printed
+            for each in chain.from_iterable(groups.values())
         ],
-        "groups": _groups(printed),
+        "groups": groups,
         "source": published_tables().source,
         "downloads": DOWNLOADS,
     }

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 from uuid import UUID
 
-from django.utils.html import format_html
 from django.utils.text import get_text_list
 
 from evaluator import Difference
@@ -21,10 +20,11 @@ from leaderboard.web.charts import profile_chart, svg
 from leaderboard.web.compare.difference_matrix import (
     best_entry,
     difference_matrix,
+    interval_of,
     significant_pairs,
     tested_pairs,
 )
-from leaderboard.web.formatting import figure_css, signed, with_bold_names
+from leaderboard.web.formatting import signed, with_bold_names
 
 _NUMBERS: Final = {2: "two", 3: "three", 4: "four", 5: "five"}
 
@@ -35,13 +35,15 @@ def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, 
     chosen = sentences.selection(
         {each.method: n_tried.get(each.method_id, 0) for each in compared.entries if each.method_id}
     )
+    matrix = difference_matrix(compared)
+    significant = significant_pairs(compared) if matrix else []
     return {
         "compared": compared,
         "title": f"{_NUMBERS[len(names)].capitalize()} methods compared",
         "verdict": with_bold_names(verdict(compared), names),
-        "matrix": difference_matrix(compared),
+        "matrix": matrix,
         "metric": metric_of(compared.entries[0].primary),
-        "pairs": [_pair_table(pair) for pair in compared.pairs],
+        "pairs": [_pair_table(pair, is_significant=pair in significant) for pair in compared.pairs],
         "profile": profile_chart.profile(compared.entries),
         "selection": with_bold_names(chosen, names),
     }
@@ -73,8 +75,8 @@ def verdict(compared: Compared) -> str:
         for relation, names in relations
         if names
     ]
-    together = f", with all {len(tested)} pairs tested together," if len(tested) > 1 else ""
-    lines = [head, f"On these recordings{together} it is {', and '.join(parts)}."] if parts else [head]
+    together = f" (all {len(tested)} pairs tested together)" if len(tested) > 1 else ""
+    lines = [head, f"It is {', and '.join(parts)}{together}."] if parts else [head]
     return " ".join([*lines, *dict.fromkeys(pair.withheld for pair in compared.pairs if pair.withheld)])
 
 
@@ -92,12 +94,13 @@ def _rivals(best: Entry, pairs: Sequence[Pair]) -> list[str]:
     return [(pair.second if pair.first == best else pair.first).method for pair in pairs]
 
 
-def _pair_table(pair: Pair) -> dict[str, Any]:
+def _pair_table(pair: Pair, *, is_significant: bool) -> dict[str, Any]:
     differences = pair.differences or {}
     columns = pair.first.scores
     names = (pair.first.method, pair.second.method)
     return {
         "pair": pair,
+        **_gap(pair, is_significant=is_significant),
         "sentence": with_bold_names(pair.sentence(), names),
         "others": pair.others(),
         "influence": with_bold_names(pair.influence(), names),
@@ -111,35 +114,37 @@ def _pair_table(pair: Pair) -> dict[str, Any]:
     }
 
 
+def _gap(pair: Pair, *, is_significant: bool) -> dict[str, str]:
+    """Word the difference in the score that ranks as the matrix does, with a star where significant."""
+    if pair.difference is None:
+        return {}
+    gap = pair.difference.difference
+    css = ("better" if gap < 0 else "worse") if is_significant else "quiet"
+    symbol = metric_of(pair.first.primary).symbol
+    return {
+        "gap": f"{symbol} {signed(gap, decimals=pair.first.decimals)}{'*' * is_significant}",
+        "gap_css": css,
+    }
+
+
 def _difference_group(
     group: Group, names: Sequence[str], pair: Pair, differences: Mapping[str, Difference]
 ) -> dict[str, Any]:
     of_group = [differences[name] for name in names]
     ends = [end for each in of_group for end in (each.low, each.high, each.difference) if end is not None]
     scale_end = svg.scale_end(ends)
-    # Both ends as wide as the widest, so that points stand in line.
-    css = figure_css(signed(end, decimals=pair.first.decimals) for end in ends)
-    rows = [_difference_row(name, pair, differences[name], scale_end, css) for name in names]
+    rows = [_difference_row(name, pair, differences[name], scale_end) for name in names]
     return {"group": group, "axis": svg.axis(scale_end), "rows": rows}
 
 
-def _difference_row(
-    name: str, pair: Pair, difference: Difference, scale_end: float, css: str
-) -> dict[str, Any]:
+def _difference_row(name: str, pair: Pair, difference: Difference, scale_end: float) -> dict[str, Any]:
     decimals = pair.first.decimals  # both are of one edition
     return {
         "heading": score_heading(name, primary=pair.first.primary),
         "first": format_rounded(pair.first.scores[name], decimals=decimals),
         "second": format_rounded(pair.second.scores[name], decimals=decimals),
         "difference": signed(difference.difference, decimals=decimals),
-        "interval": ""
-        if difference.low is None or difference.high is None
-        else format_html(
-            '<span class="{css}">{}</span> to <span class="{css}">{}</span>',
-            signed(difference.low, decimals=decimals),
-            signed(difference.high, decimals=decimals),
-            css=css,
-        ),
+        "interval": interval_of(difference, decimals=decimals),
         "p": p_cell(difference.p, difference.p_below),
         # why there is neither interval nor p
         "reason": ""

@@ -130,7 +130,7 @@ def _forest(
         ForestRow(
             entry=entry,
             drawing=svg.difference(end, each.difference, each.low, each.high, start=start),
-            interval=_interval(each, entry.decimals),
+            interval=interval_of(each, decimals=entry.decimals),
             p=p_cell(each.p, each.p_below),
         )
         for entry, each in to_best
@@ -138,7 +138,8 @@ def _forest(
     return rows, svg.axis(end, start=start)
 
 
-def _interval(difference: Difference, decimals: int) -> str:
+def interval_of(difference: Difference, *, decimals: int) -> str:
+    """Word the interval of a difference with signs; empty where it is not known."""
     if difference.low is None or difference.high is None:
         return ""
     return f"{signed(difference.low, decimals=decimals)} to {signed(difference.high, decimals=decimals)}"

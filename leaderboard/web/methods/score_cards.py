@@ -18,12 +18,17 @@ from leaderboard.web.formatting import signed
 
 
 class Gap(NamedTuple):
-    """The difference of an entry to another one in the score that ranks: below 0 the entry is better."""
+    """The difference of an entry to another one in the score that ranks: below 0 the entry is better.
+
+    `size` is that of a lead, of an entry of rank 1, or else of what the entry is behind.
+    """
 
     other: Entry
     value: str  # of the other
     text: str
     interval: str
+    size: str
+    size_interval: str
     p: str
     is_significant: bool
     why_not_tested: str
@@ -79,12 +84,16 @@ def gap_of(pair: Pair) -> Gap:
     entry, other, difference = pair.first, pair.second, pair.difference
     decimals = max(entry.decimals, other.decimals)
     known = difference.difference if difference else (entry.value or 0.0) - (other.value or 0.0)
-    ends = (difference.low, difference.high) if difference else (None, None)
+    ends = [end for end in (difference.low, difference.high) if end is not None] if difference else []
+    sign = -1 if entry.rank == 1 else 1
+    sizes = [signed(sign * end, decimals=decimals).lstrip("+") for end in (known, *ends[::sign])]
     return Gap(
         other=other,
         value=format_rounded(other.value, decimals=other.decimals),
         text=signed(known, decimals=decimals),
-        interval=" to ".join(signed(end, decimals=decimals) for end in ends if end is not None),
+        interval=" to ".join(signed(end, decimals=decimals) for end in ends),
+        size=sizes[0],
+        size_interval=" to ".join(sizes[1:]),
         p=p_cell(difference.p, difference.p_below) if difference else "",
         is_significant=bool(difference and difference.is_significant),
         why_not_tested=pair.withheld,

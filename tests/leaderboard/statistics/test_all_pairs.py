@@ -47,19 +47,21 @@ def compared(
 @pytest.mark.parametrize(
     ("p_of_b", "p_of_c", "ending"),
     [
-        (0.001, 0.001, "it is significantly better than the other two."),
-        (0.4, 0.4, "it is not significantly better than the other two."),
-        (0.4, 0.001, "it is significantly better than C, and not significantly better than B."),
+        (0.001, 0.001, "It is significantly better than the other two (all 3 pairs tested together)."),
+        (0.4, 0.4, "It is not significantly better than the other two (all 3 pairs tested together)."),
+        (
+            0.4,
+            0.001,
+            "It is significantly better than C, and not significantly better than B "
+            "(all 3 pairs tested together).",
+        ),
     ],
 )
 def test_the_best_of_three_is_named_with_those_that_it_is_significantly_better_than(
     p_of_b: float, p_of_c: float, ending: str
 ) -> None:
     sentence = compare_tables.verdict(compared(p_of_b, p_of_c, 0.5))
-    head = (
-        "Of these three, A has the lowest MiD, 10.00. On these recordings, with all 3 pairs tested together"
-    )
-    assert sentence == f"{head}, {ending}"
+    assert sentence == f"Of these three, A has the lowest MiD, 10.00. {ending}"
 
 
 def test_a_p_that_is_small_among_three_by_chance_names_no_winner() -> None:
@@ -70,22 +72,31 @@ def test_a_p_that_is_small_among_three_by_chance_names_no_winner() -> None:
 def test_a_class_of_p_counts_as_its_upper_end() -> None:
     """On a hidden split p < 0.01 is all that is known: enough for three methods, not for four."""
     three = compared(None, None, None, below=(0.01, 0.01, 1.0))
-    assert "it is significantly better than the other two." in compare_tables.verdict(three)
+    assert (
+        "It is significantly better than the other two (all 3 pairs tested together)."
+        in compare_tables.verdict(three)
+    )
     four = compared(*[None] * 6, entries=(A, B, C, replace(C, method="D")), below=(0.01, 0.01, 0.01, 1, 1, 1))
-    assert "it is not significantly better than the other three." in compare_tables.verdict(four)
+    assert (
+        "It is not significantly better than the other three (all 6 pairs tested together)."
+        in compare_tables.verdict(four)
+    )
 
 
 def test_no_method_is_called_worse_that_the_board_marks_as_possibly_best() -> None:
     entries = with_range(A, 1, 2), with_range(B, 1, 3), with_range(C, 2, 3)
     sentence = compare_tables.verdict(compared(0.001, 0.001, 0.5, entries=entries))
-    assert sentence.endswith("it is significantly better than C, and not significantly better than B.")
+    assert sentence.endswith(
+        "It is significantly better than C, and not significantly better than B "
+        "(all 3 pairs tested together)."
+    )
 
 
 def test_methods_with_separate_rank_ranges_on_the_board_are_separate() -> None:
     """The ranges of a board hold all at once: A is before B and C wherever their true ranks lie in them."""
     entries = with_range(A, 1, 1), with_range(B, 2, 3), with_range(C, 2, 3)
     sentence = compare_tables.verdict(compared(0.04, 0.04, 0.5, entries=entries))
-    assert sentence.endswith("it is significantly better than the other two.")
+    assert sentence.endswith("It is significantly better than the other two (all 3 pairs tested together).")
 
 
 @pytest.mark.slow
@@ -121,10 +132,10 @@ def test_among_equal_methods_a_winner_is_rarely_named_and_never_against_the_boar
                 else compared(*p_values, entries=entries)
             )
         ]
-        worse = sentences[-1].partition("it is significantly better than ")[2].partition(", and not")[0]
+        worse = sentences[-1].partition("It is significantly better than ")[2].partition(", and not")[0]
         named = [entry for entry in entries if entry.method in worse]
         assert not any(entry.intervals["mid"].is_with_best for entry in named)
-    share = sum("it is significantly better than" in each for each in sentences) / n
+    share = sum("It is significantly better than" in each for each in sentences) / n
     assert share <= 0.05 + margin(0.05, n)
 
 

@@ -77,7 +77,7 @@ def test_code_without_a_language_is_an_output_which_gets_no_button() -> None:
 def test_short_cells_stay_in_one_line_and_long_ones_get_room() -> None:
     drawn = markdown.page(f"| a | b |\n|---|---|\n| 93.3 ± 0.6 | {'word ' * 9}|\n").html
     assert "<td>93.3\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}0.6</td>" in drawn
-    assert '<td class="wraps">word word' in drawn
+    assert '<td data-label="b" class="wraps">word word' in drawn, "with its head, for a phone"
 
 
 def test_an_option_of_a_command_does_not_break_at_its_hyphens() -> None:

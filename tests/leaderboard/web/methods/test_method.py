@@ -112,7 +112,7 @@ def test_head_says_the_score_its_lead_and_the_way_there(client: Client, method: 
         for name in ("Deep Scale", "Foo")
     )
     card = main.one("dl", class_="score-card")
-    assert f"Ahead of the next−{best - own:.1f} ×10⁻⁴Deep Scale, {best}" in card.text
+    assert f"Lead over the second{best - own:.1f} ×10⁻⁴Deep Scale, {best}" in card.text
     assert "2 submissions over time" in card.text
     assert len(card.all("svg", class_="sparkline")) == 1
     Method.objects.update(visibility=Visibility.ANONYMOUS)
