@@ -120,7 +120,7 @@ def page(text: str) -> Document:
 
 
 def _label_cells(tokens: Sequence[Token]) -> None:
-    """Give each cell but a row's first the head of its column, which a phone shows beside it."""
+    """Give each cell but a row's first the head of its column, which a phone shows next to it."""
     heads, column = list[str](), 0
     for token, inline in pairwise(tokens):
         if token.type == "thead_open":
