@@ -64,7 +64,7 @@ HOSTILE: Final[dict[str, Callable[[], bytes]]] = {
     "nested tuple as a key": lambda: whole(b"}" + NESTED + b"Ns"),
     "one list copied and kept": lambda: whole(remembered(LIST) + called(name("builtins", "list"), MANY)),
     "one dictionary copied and dropped": lambda: whole(
-        remembered(DICTIONARY) + called(name("builtins", "dict"), VERY_MANY, after=b"0")
+        remembered(DICTIONARY) + called(name("builtins", "dict"), 4 * VERY_MANY, after=b"0")
     ),
     "one dictionary as the state of many": lambda: whole(
         remembered(DICTIONARY) + (name("foo", "EasyDict") + b")Rh\x00b0") * VERY_MANY
