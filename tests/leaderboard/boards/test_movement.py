@@ -14,6 +14,8 @@ from tests.caching import forget_boards
 
 pytestmark = pytest.mark.slow
 
+NEW = "On the board for less than 14 days"
+
 
 @pytest.fixture
 def months(edition: Edition, owner: User) -> list[Method]:
@@ -54,9 +56,7 @@ def test_ranks_of_another_edition_and_boards_of_the_past_have_not_moved(months: 
 def test_page_tells_what_is_new_and_what_has_moved(months: list[Method], client: Client) -> None:
     root = pages.get(client)
     new = [
-        row
-        for row in root.one("table", class_="board").one("tbody").all("tr")
-        if row.all("span", class_="new")
+        row for row in root.one("table", class_="board").one("tbody").all("tr") if row.all("span", title=NEW)
     ]
     assert {row.one("div", class_="name").text for row in new} == {f"{each.name} new" for each in months[6:]}
     moved = movement.moved(board_of(), now=timezone.now())
@@ -66,6 +66,6 @@ def test_page_tells_what_is_new_and_what_has_moved(months: list[Method], client:
     Submission.objects.update(submitted_at=timezone.now())
     Method.objects.update(shown_at=timezone.now())
     builders.board_changed("test")
-    assert pages.get(client).one("table", class_="board").one("tbody").all("span", class_="new") == [], (
+    assert pages.get(client).one("table", class_="board").one("tbody").all("span", title=NEW) == [], (
         "of most rows it says nothing"
     )
