@@ -43,7 +43,7 @@ from leaderboard.models import Method, Split
 from leaderboard.statistics import comparisons
 public = Method.objects.filter(visibility="PUBLIC", submissions__split="demo").order_by("created_at")
 two = [method.pk for method in public.exclude(name__startswith="Detection")[:2]]
-comparisons.of(
+comparisons.compare(
     methods=two, split=Split.objects.get(pk="demo"), viewer=AnonymousUser(), now=timezone.now()
 )
 print(json.dumps("&".join(f"m={pk}" for pk in two)))
