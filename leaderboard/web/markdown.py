@@ -23,7 +23,7 @@ _MIN_WRAPS: Final = 40
 # An option of a command, which a browser would break at its hyphens.
 _CODE: Final = re.compile(r"<code\b.*?</code>", re.DOTALL)
 _OPTION: Final = re.compile(r"(?<=[\s>\[])--?[a-z][\w-]*")
-_TABLE: Final = '<div class="scroll" tabindex="0" role="group" aria-label="Table">\n<table class="list">\n'
+_TABLE: Final = re.compile(r"<table>\n(.*?)</table>", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -115,8 +115,7 @@ def page(text: str) -> Document:
     for token in _inline(tokens):
         if "href" in token.attrs and not _TARGET.match(str(token.attrs["href"])):
             token.attrSet("href", "#")
-    _label_cells(tokens)
-    return _document(tokens, parser, table=_TABLE.replace('"list"', '"list cards"'))
+    return _document(tokens, parser)
 
 
 def _label_cells(tokens: Sequence[Token]) -> None:
@@ -137,7 +136,8 @@ def _label_cells(tokens: Sequence[Token]) -> None:
 
 @cache
 def _parser(*, images: bool) -> MarkdownIt:
-    parser = MarkdownIt("commonmark", {"html": False}).enable(["table", "strikethrough"])
+    parser = MarkdownIt("commonmark", {"html": False, "typographer": True})
+    parser.enable(["table", "strikethrough", "smartquotes"])
     return parser if images else parser.disable("image")
 
 
@@ -145,7 +145,7 @@ def _inline(tokens: Sequence[Token]) -> list[Token]:
     return [child for token in tokens for child in token.children or ()]
 
 
-def _document(tokens: list[Token], parser: MarkdownIt, *, table: str = _TABLE) -> Document:
+def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
     """Add anchors of headings and classes of tables, and collect the plain text of each part."""
     parts: list[Part] = []
     heading, texts, prose, code, anchors = (
@@ -155,6 +155,7 @@ def _document(tokens: list[Token], parser: MarkdownIt, *, table: str = _TABLE) -
         list[str](),
         set[str](),
     )
+    _label_cells(tokens)
     for at, token in enumerate(tokens):
         if token.type == "heading_open":
             parts.append(Part(heading, " ".join(filter(None, [*texts, *code])), " ".join(prose)))
@@ -177,10 +178,17 @@ def _document(tokens: list[Token], parser: MarkdownIt, *, table: str = _TABLE) -
     parts.append(Part(heading, " ".join(filter(None, [*texts, *code])), " ".join(prose)))
     html = parser.renderer.render(tokens, parser.options, {})
     html = _CODE.sub(lambda code: _OPTION.sub(r'<span class="together">\g<0></span>', code[0]), html)
-    html = html.replace("<table>\n", table).replace("</table>", "</table>\n</div>")
+    html = _TABLE.sub(_framed, html)
     # The parser escapes what is no markup of its own.
     drawn = SafeString(html)
     return Document(drawn, tuple(part for part in parts if part.heading.level or part.text))
+
+
+def _framed(table: re.Match[str]) -> str:
+    """Let a table scroll; one with sentences becomes cards on a phone."""
+    kind = "list cards" if 'class="wraps"' in table[1] else "list"
+    frame = '<div class="scroll" tabindex="0" role="group" aria-label="Table">'
+    return f'{frame}\n<table class="{kind}">\n{table[1]}</table>\n</div>'
 
 
 def _shape(cell: Token, inline: Token) -> None:
