@@ -27,7 +27,7 @@ _FILLERS: Final = frozenset(
 
 
 class Hit(NamedTuple):
-    """A part of a guide; `title` is empty where it is the beginning. The snippet marks the words."""
+    """A part of a guide; its beginning has no heading. The snippet marks the words."""
 
     title: str
     heading: str
@@ -36,7 +36,7 @@ class Hit(NamedTuple):
 
 
 def find(query: str) -> list[Hit]:
-    """Return at most `MAX_HITS` parts, best first; those with some words if none has all."""
+    """Return at most `MAX_HITS` parts, those of one guide together; parts with some words if none has all."""
     typed = set(_WORD.findall(query.lower()))
     words = sorted(typed - _FILLERS or typed)
     asked = [_pattern(word) for word in words]
@@ -48,20 +48,22 @@ def find(query: str) -> list[Hit]:
         is_background = name.startswith("adr/") or name == "changelog"
         for part in guide.parts:
             heading, text = part.heading, " ".join(part.text.split())
-            everything = f"{guide.title} {heading.text} {text}"
+            own = f"{heading.text} {text}"
+            everything = f"{guide.title} {own}"
             counts = [len(word.findall(everything)) for word in asked]
-            if any(counts):
+            if any(word.search(own) for word in asked):
                 n_beginnings = sum(word.search(everything) is None for word in exact)
                 score = _score(heading.text, guide.title, asked) - 4 * (name in _REFERENCES)
                 score += sum(min(count, _MAX_COUNT) for count in counts)
                 rank = (counts.count(0), n_beginnings, is_background, -score)
                 anchor = f"#{heading.anchor}" if heading.level > 1 else ""
                 address = reverse("guide", args=[name]) + anchor
-                names = (guide.title, heading.text) if anchor else ("", guide.title)
-                hit = Hit(*names, address, _snippet(text, " ".join(part.prose.split()), asked))
-                ranked.append((rank, hit))
+                snippet = _snippet(text, " ".join(part.prose.split()), asked)
+                ranked.append((rank, Hit(guide.title, heading.text if anchor else "", address, snippet)))
     has_all = [each for each in ranked if each[0][0] == 0]
-    return [hit for _, hit in sorted(has_all or ranked, key=lambda each: each[0])[:MAX_HITS]]
+    hits = [hit for _, hit in sorted(has_all or ranked, key=lambda each: each[0])[:MAX_HITS]]
+    titles = [hit.title for hit in hits]
+    return sorted(hits, key=lambda hit: titles.index(hit.title))
 
 
 def _score(heading: str, title: str, asked: list[re.Pattern[str]]) -> float:
