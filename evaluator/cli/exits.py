@@ -21,7 +21,7 @@ class Exit(IntEnum):
 
 
 MEANINGS: Final[dict[Exit, str]] = {
-    Exit.GOOD: "good",
+    Exit.GOOD: "success",
     Exit.REJECTED: "the file is at fault: rejected, too large, malformed, or an invalid receipt",
     Exit.USAGE: "wrong usage: an unknown option or name, a file that cannot be opened or written",
     Exit.NETWORK: "network: no leaderboard at the address, or an incomplete answer",
