@@ -68,7 +68,7 @@ class PublishedTableView(APIView):
 
     @extend_schema(operation_id="published_table", responses={200: PublishedTableSerializer, **errors(404)})
     def get(self, request: Request, name: str) -> Response:
-        """A table by its name, as `ablation-frame-gap`."""
+        """A table by its name, such as `ablation-frame-gap`."""
         tables = published_tables().tables if settings.BENCHMARK.has_paper_tables else ()
         match = next((table for table in tables if table.name == name), None)
         if match is None:

@@ -43,7 +43,7 @@ class FileView(APIView):
         operation_id="submission_file", responses={(200, "application/octet-stream"): bytes, **errors(404)}
     )
     def get(self, request: Request, submission_id: str) -> HttpResponseBase:
-        """The bytes as your team sent them. The file of another team gives 404, also for maintainers."""
+        """The bytes as your team sent them. Another team's file returns 404, even for maintainers."""
         submission = _own(request, submission_id)
         name = files.predictions_name(submission.digest)
         if not files.store().exists(name):

@@ -68,7 +68,9 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
         allow_null=True, help_text="When the team withdrew it; null: not withdrawn."
     )
     is_final = serializers.BooleanField(help_text="Whether the state will not change any more.")
-    fault_is_ours = serializers.BooleanField(help_text="Whether scoring failed on our side, not by the file.")
+    fault_is_ours = serializers.BooleanField(
+        help_text="Whether scoring failed on our side, not because of the file."
+    )
     digest = serializers.CharField(help_text="Digest of the file's bytes.")
     size_bytes = serializers.IntegerField(help_text="Size of the file.")
     note = serializers.CharField(allow_blank=True, help_text="The team's own note.")

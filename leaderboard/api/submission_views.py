@@ -54,7 +54,7 @@ class SubmissionsView(APIView):
         },
     )
     def post(self, request: Request) -> Response:
-        """Submit one file to one split. The response comes once it is safely stored; the scores follow."""
+        """Submit one file to one split. The server responds once the file is stored; the scores follow."""
         form = cast("QueryDict", request.data)  # the only parser here is that of multipart bodies
         require_split(request.auth, str(form.get("split", "")))
         now = timezone.now()
@@ -96,7 +96,7 @@ class SubmissionView(APIView):
         responses={200: SubmissionSerializer, **errors(404)},
     )
     def get(self, request: Request, submission_id: UUID) -> Response:
-        """State, then scores or problems. The submission of another team gives 404."""
+        """State, then scores or problems. Another team's submission returns 404."""
         rows = visible(request).prefetch_related(Prefetch("evaluations", EVALUATIONS))
         submission = get_object_or_404(rows, pk=submission_id)
         (view,) = outcomes.for_submissions([submission], now=timezone.now())

@@ -2,6 +2,7 @@
 
 import re
 from functools import cache
+from itertools import groupby
 from typing import Any, Final
 
 from django.utils.html import format_html, format_html_join
@@ -144,8 +145,12 @@ def _objects_in(node: Any, schemas: Node) -> list[str]:
 
 
 def _fields(node: Node) -> list[Node]:
+    """Arrange the fields of an object; successive ones of the same words are one row."""
     required = node.get("required", [])
-    return [_field(name, field, name in required) for name, field in node.get("properties", {}).items()]
+    fields = [_field(name, field, name in required) for name, field in node.get("properties", {}).items()]
+    groups = groupby(fields, key=lambda field: (field["kind"], field["about"], field["is_required"]))
+    rows = [list(same) for _, same in groups]
+    return [{**same[0], "name": ", ".join(each["name"] for each in same)} for same in rows]
 
 
 def _field(name: str, node: Node, is_required: bool) -> Node:

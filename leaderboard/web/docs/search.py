@@ -79,9 +79,9 @@ def _pattern(word: str, *, is_exact: bool = False) -> re.Pattern[str]:
 
 
 def _snippet(text: str, prose: str, asked: list[re.Pattern[str]]) -> SafeString:
-    """Return prose with the words, or the beginning of any prose, or what else has the words."""
+    """Return prose with the words, or what else has the words, or the beginning of the prose."""
     marked = re.compile("(" + "|".join(word.pattern for word in asked) + ")", re.IGNORECASE)
-    text = prose or text
+    text = prose if marked.search(prose) or not marked.search(text) else text
     first = marked.search(text)
     begin = text.rfind(" ", 0, max(0, first.start() - 60)) + 1 if first else 0
     end = len(text) if len(text) <= begin + _SNIPPET else text.rfind(" ", 0, begin + _SNIPPET)
