@@ -172,7 +172,7 @@ def test_the_page_imports_a_paper_with_missing_values_and_says_where_every_probl
     document["results"]["test"]["later"][3] = None
     assert send(json.dumps(document).encode()).status_code == 302
     page = assert_sound(keeper.get(PAGE)).one("main").text
-    assert "the start" in page
+    assert "the first edition" in page
     assert "Later" in page
     assert "Later" in keeper.get("/board/test/").text
     assert "@misc{ater2026later," in keeper.get("/board/test.bib").text
