@@ -23,7 +23,7 @@ FORMS = ("/board/test/editions/1/", "/board/test/editions/1.csv", "/board/test/e
 A_DAY = timedelta(days=1)
 PAGE = "/maintain/published/"
 # What a page of the past says of the present board.
-CHANGES = re.compile(rb'<section class="whole" aria-labelledby="changes">.*?</section>', re.DOTALL)
+CHANGES = re.compile(rb'<section aria-labelledby="changes">.*?</section>', re.DOTALL)
 
 
 def representations(client: Client, at: datetime) -> dict[str, bytes]:
