@@ -45,6 +45,7 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
         "profile": profile(board),
         "n_profiles": n_profiles(board),
         "range_leaders": range_leaders(board),
+        "has_quoted": any(entry.kind == "published" for entry in _public(board)),
         "significance": significance_chart.significance(pairs, split=board.split.pk),
         "n_pairs": len(pairs),
         "n_waiting": n_waiting,
@@ -59,7 +60,9 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
 
 def _resolution(board: Board, pairs: Sequence[Pair]) -> list[tuple[str, list[str]]]:
     """Return by TTC range the smallest difference that the board can detect, in each metric."""
-    known = sentences.resolutions([pair.differences or {} for pair in comparisons.neighbours(pairs)])
+    tested = [pair.differences for pair in comparisons.neighbours(pairs)]
+    # A median of some would change with each that comes.
+    known = sentences.resolutions([each for each in tested if each]) if None not in tested else {}
     decimals = board.edition.decimals if board.edition else 2
     rows: dict[str, list[str]] = {}
     for names in grouped_names(board.rules.score_names).values():
