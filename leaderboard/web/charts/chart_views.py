@@ -45,7 +45,6 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
         "profile": profile(board),
         "n_profiles": n_profiles(board),
         "range_leaders": range_leaders(board),
-        "has_quoted": any(entry.kind == "published" for entry in _public(board)),
         "significance": significance_chart.significance(pairs, split=board.split.pk),
         "n_pairs": len(pairs),
         "n_waiting": n_waiting,
