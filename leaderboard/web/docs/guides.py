@@ -52,6 +52,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Quick start for maintainers": "hosting",
         "Maintenance": "maintainers",
         "Operations": "operations",
+        "Settings": "settings",
         "Host another dataset": "another-dataset",
         "Capacity": "capacity",
         "Security": "security",
