@@ -45,6 +45,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
     "The numbers": {
         "Scoring": "scoring",
         "Uncertainty": "uncertainty",
+        "Validation": "validation",
         "Editions": "editions",
         "Changelog": "changelog",
     },
