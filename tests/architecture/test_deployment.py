@@ -176,7 +176,7 @@ def test_compose_passes_every_documented_variable() -> None:
     """But for those of tests and of the command line, and for places within the image."""
     page = (REPOSITORY / "docs/settings.md").read_text()
     documented = page.partition("## Tests and the command line")[0]
-    names = set(re.findall(r"^\| `(TSTTC_\w+)`", documented, flags=re.MULTILINE))
+    names = set(re.findall(r"^- \*\*`(TSTTC_\w+)`", documented, flags=re.MULTILINE))
     within = {"TSTTC_DATA_DIR", "TSTTC_FILES_DIR", "TSTTC_GROUND_TRUTH_DIR", "TSTTC_STATIC_ROOT"}
     within |= {"TSTTC_DIST_DIR", "TSTTC_WEB_BIND", "TSTTC_HTTPS", "TSTTC_DEBUG"}
     assert len(names) > 40
