@@ -1,4 +1,4 @@
-"""The reference of the Python packages, as Markdown below the guide `docs/python-reference.md`.
+"""The references of the Python packages, as Markdown below their guides.
 
 It reads the sources and imports nothing: a server has neither OpenCV nor torch, which some modules need.
 """
@@ -18,70 +18,78 @@ _MAX_WIDTH: Final = 76
 # The default of a dataclass's field, where it is written as a call.
 _FIELD: Final = re.compile(r"\bfield\((?:default=([\w.]+))?.*\)$")
 
-SECTIONS: Final[dict[str, dict[str, tuple[str, ...]]]] = {
-    "Read and write": {
-        "evaluator": (
-            *("read_predictions", "write_predictions", "convert", "read_truth", "read_manifest"),
-            *("read_numbering", "manifest_frame", "predictions_from_frame"),
-        ),
+SECTIONS: Final[dict[str, dict[str, dict[str, tuple[str, ...]]]]] = {
+    "python-reference": {
+        "Read and write": {
+            "evaluator": (
+                *("read_predictions", "write_predictions", "convert", "read_truth", "read_manifest"),
+                *("read_numbering", "manifest_frame", "predictions_from_frame"),
+            ),
+        },
+        "Score": {
+            "evaluator": (
+                *("evaluate", "get_protocol", "rounded", "format_rounded"),
+                *("PROTOCOLS", "SCORE_NAMES", "TTC_RANGES"),
+            )
+        },
+        "Compare": {"evaluator": ("compare_predictions", "confidence_intervals", "Difference")},
+        "Scale ratios": {
+            "evaluator": ("scale_ratio_to_ttc", "ttc_to_scale_ratio", "convert_rate", "fps_of_gap"),
+        },
+        "Files and scores": {
+            "evaluator": (
+                *("Predictions", "GroundTruth", "Manifest", "Table", "Report", "RangeScore", "Protocol"),
+                *("Rejected", "Problem", "PROBLEM_CODES"),
+            ),
+            "evaluator.metrics.protocol": ("TTCRange",),
+            "evaluator.metrics.registry": ("Metric",),
+            "evaluator.problems": ("FileWarning",),
+            "evaluator.scoring.results": ("GroupScores",),
+            "evaluator.truth.numbering": ("Numbering",),
+            "evaluator.truth.objects": ("Objects",),
+            "evaluator.units": ("Units",),
+        },
+        "Client of a leaderboard": {
+            "evaluator": ("Client", "ClientError"),
+            "evaluator.client.answers": (
+                *("Account", "Board", "BoardEntry", "Compared", "ConfidenceInterval", "Method", "Pair"),
+                *("Queue", "Quota", "Submission", "VisibilityPreview"),
+                *("BadAnswer", "Refused", "TimedOut", "Unreachable"),
+            ),
+        },
+        "With torch": {
+            "evaluator.torch": ("ScoreMetric",),
+            "evaluator.lightning": ("ScoreCallback",),
+        },
     },
-    "Score": {
-        "evaluator": (
-            *("evaluate", "get_protocol", "rounded", "format_rounded"),
-            *("PROTOCOLS", "SCORE_NAMES", "TTC_RANGES"),
-        )
-    },
-    "Compare": {"evaluator": ("compare_predictions", "confidence_intervals", "Difference")},
-    "Scale ratios": {
-        "evaluator": ("scale_ratio_to_ttc", "ttc_to_scale_ratio", "convert_rate", "fps_of_gap"),
-    },
-    "Files and scores": {
-        "evaluator": (
-            *("Predictions", "GroundTruth", "Manifest", "Table", "Report", "RangeScore", "Protocol"),
-            *("Rejected", "Problem", "PROBLEM_CODES"),
-        ),
-        "evaluator.metrics.protocol": ("TTCRange",),
-        "evaluator.metrics.registry": ("Metric",),
-        "evaluator.problems": ("FileWarning",),
-        "evaluator.scoring.results": ("GroupScores",),
-        "evaluator.truth.numbering": ("Numbering",),
-        "evaluator.truth.objects": ("Objects",),
-        "evaluator.units": ("Units",),
-    },
-    "Client of a leaderboard": {
-        "evaluator": ("Client", "ClientError"),
-        "evaluator.client.answers": (
-            *("Account", "Board", "BoardEntry", "Compared", "ConfidenceInterval", "Method", "Pair"),
-            *("Queue", "Quota", "Submission", "VisibilityPreview"),
-            *("BadAnswer", "Refused", "TimedOut", "Unreachable"),
-        ),
-    },
-    "With torch": {
-        "evaluator.torch": ("ScoreMetric",),
-        "evaluator.lightning": ("ScoreCallback",),
-        "tsttc_baselines.torch": ("BoxCrops", "crops_of", "crops_of_clip"),
-    },
-    "Baselines": {
-        "tsttc_baselines.folders": ("read_folder", "read_folder_truth", "SequenceFolder"),
-        "tsttc_baselines.images": ("ImageCache",),
-        "tsttc_baselines.clips": ("Clip",),
-        "tsttc_baselines.estimates": ("Estimator", "Estimate", "Unusable"),
-        "tsttc_baselines.methods": ("get_method", "Method", "Parameter"),
-        "tsttc_baselines.own_methods": ("find_method",),
-        "tsttc_baselines.running": ("run_method", "Run"),
-        "tsttc_baselines.boxes": ("scale_ratio_of_boxes", "expand", "is_usable"),
-        "tsttc_baselines.deep_scale.weights": ("read_weights", "write_weights", "Weights"),
+    "baselines-reference": {
+        "Frames": {
+            "tsttc_baselines.folders": ("read_folder", "read_folder_truth", "SequenceFolder"),
+            "tsttc_baselines.images": ("ImageCache",),
+            "tsttc_baselines.clips": ("Clip",),
+            "tsttc_baselines.boxes": ("scale_ratio_of_boxes", "expand", "is_usable"),
+        },
+        "Methods": {
+            "tsttc_baselines.estimates": ("Estimator", "Estimate", "Unusable"),
+            "tsttc_baselines.methods": ("get_method", "Method", "Parameter"),
+            "tsttc_baselines.own_methods": ("find_method",),
+            "tsttc_baselines.running": ("run_method", "Run"),
+        },
+        "Networks": {
+            "tsttc_baselines.torch": ("BoxCrops", "crops_of", "crops_of_clip"),
+            "tsttc_baselines.deep_scale.weights": ("read_weights", "write_weights", "Weights"),
+        },
     },
 }
-"""By the titles of the page: public names by the modules from which they are imported."""
+"""By guide and title: public names by the modules from which they are imported."""
 
 _Definition = ast.FunctionDef | ast.ClassDef
 
 
-def text() -> str:
-    """The reference of both packages as Markdown."""
+def text(guide: str) -> str:
+    """The reference of a package as Markdown, for its guide."""
     parts: list[str] = []
-    for title, modules in SECTIONS.items():
+    for title, modules in SECTIONS[guide].items():
         mark = "- " if len(modules) > 1 else ""
         parts += [f"## {title}", ""]
         parts += [f"{mark}From `{module}`: {_links(module, names)}" for module, names in modules.items()]
@@ -94,7 +102,8 @@ def text() -> str:
 
 def _types(signature: str, package: str) -> Iterator[str]:
     """Links to the classes that a signature names; of two with one name to that of the package."""
-    every = [(name, of) for modules in SECTIONS.values() for of, names in modules.items() for name in names]
+    modules = [each for sections in SECTIONS.values() for part in sections.values() for each in part.items()]
+    every = [(name, module) for module, names in modules for name in names]
     homes = dict(sorted(every, key=lambda each: each[1].startswith(package)))
     named = dict.fromkeys(name for name in re.findall(r"\b[A-Z][a-z]\w+", signature) if name in homes)
     if named:
@@ -103,7 +112,8 @@ def _types(signature: str, package: str) -> Iterator[str]:
 
 def _links(module: str, names: Iterable[str]) -> str:
     """Links to the names of a module."""
-    return ", ".join(f"[`{name}`](#{slugify(f'{module}.{name}')})" for name in names)
+    page = "baselines-reference.md" if module.startswith("tsttc_baselines") else "python-reference.md"
+    return ", ".join(f"[`{name}`]({page}#{slugify(f'{module}.{name}')})" for name in names)
 
 
 @cache
