@@ -50,7 +50,8 @@ def score_card(entry: Entry, rows: Sequence[Entry], *, n_ranked: int, gap: Gap |
     """Make the card of an entry among `rows`, which everybody sees; None without a value."""
     if entry.value is None:
         return None
-    others = [row for row in rows if row.method_id != entry.method_id]
+    # An entry without a rank is not the best of its method: the board's row of that method is another one.
+    others = [row for row in rows if entry.rank is None or row.method_id != entry.method_id]
     values = [row.value for row in others if row.value is not None]
     metric = metric_of(entry.primary)
     n_better = sum(value < entry.value for value in values)

@@ -8,7 +8,7 @@ from django.test import Client
 from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
-from leaderboard.models import Edition, Method, Score, Split, Submission, User
+from leaderboard.models import Edition, Method, PublishedResult, Score, Split, Submission, User
 from leaderboard.submissions import intake
 from tests import board_rows, builders, pages
 from tests.editions import board_now
@@ -81,7 +81,13 @@ def test_what_another_submission_of_the_method_surpasses_has_no_rank(
     shows = "would show" if visibility == "PRIVATE" else "shows"
     assert f"Not the best of its method: the board {shows} another submission" in root.one("main").text
     assert "Rank" not in card(root)
-    assert not root.all("figure", class_="all-values"), "it is none of the values on the board"
+    strip = root.one("figure", class_="all-values")
+    assert "the tall mark is this submission, which the board does not show" in strip.text
+    n_on_board = PublishedResult.objects.filter(split="test").count() + (visibility == "PUBLIC")
+    words = strip.one("span", class_="spoken").text
+    assert sum(int(n) for n in re.findall(r"\d+", words)) == n_on_board, (
+        "the board's one of its method is drawn"
+    )
     assert "Columns of the LaTeX row: rank (none" in root.one("main").text
     assert "Rank" in card(look(signed_in, better))
 
