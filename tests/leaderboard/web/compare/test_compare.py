@@ -163,8 +163,8 @@ def test_the_page_says_on_how_few_recordings_the_difference_rests(
     builders.infer_all()
     sentence = get(client, *ids).one("p", class_="influence").text
     assert re.fullmatch(
-        r"How robust is this\? Without the \d+ of \d+ recordings on which M1.05 leads most, the difference "
-        r"is no longer significant\.( Without \d+ such recordings, M\S+ is better\.)?",
+        r"How robust is this\? If the \d+ of \d+ recordings that most favour M1.05 are left out, the "
+        r"difference is no longer significant\.( If \d+ are left out, M\S+ is better\.)?",
         sentence,
     ), sentence
 
@@ -198,8 +198,8 @@ def test_what_was_chosen_of_several_submissions_is_shown_and_what_that_is_worth(
     builders.score_all()
     builders.infer_all()
     sentence = (
-        f"{name} is the best of 3 scored submissions: the best of 3 equally good variants looks better than "
-        "it is by about 0.60 standard errors of the difference of two of them."
+        f"{name} is the best of 3 scored submissions. Picking the best of several equally good submissions "
+        "makes a method look better by chance: by about 0.60 standard errors of a difference for the best of 3."
     )
     assert get(client, *ids).one("p", class_="selection").text == sentence
     method_page = pages.page(client.get(f"/methods/{ids[0]}/"))
