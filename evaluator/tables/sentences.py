@@ -140,8 +140,8 @@ def selection(n_tried: Mapping[str, int]) -> str:
 
     >>> print(selection({"A": 3, "B": 1, "C": 10}))
     A is the best of 3 scored submissions, C of 10. Picking the best of several equally good submissions \
-makes a method look better by chance: by about 0.60 standard errors of a difference for the best of 3, and 1.09 \
-for the best of 10.
+makes a method look better by chance: by about 0.60 standard errors of a difference for the best of 3, and \
+1.09 for the best of 10.
     """
     chosen = {name: n for name, n in n_tried.items() if n > 1}
     if not chosen:
