@@ -92,8 +92,8 @@ def test_what_may_be_the_best_is_marked_as_on_the_board(
         root = pages.page(signed_in.get(address))
         cell = root.one("div", class_="result").all("tr")[1].all("td")[0]
         assert "with-best" in cell.classes
-        assert cell.text.endswith(", statistically tied for best in its column (95% confidence)")
-        assert "grey: tied for best at 95% confidence" in root.one("main").text
+        assert cell.text.endswith(", may be the best of its column (95% confidence)")
+        assert "grey: may be the best (95% confidence)" in root.one("main").text
 
 
 # --- beside others ---------------------------------------------------------------------------------------
