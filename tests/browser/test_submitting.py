@@ -82,7 +82,7 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     tab_to(page, "Preview")
     press("Enter")
     page.wait_for_url("**/visibility/?*visibility=PUBLIC*")
-    tab_to(page, "I know that this cannot be undone.")
+    tab_to(page, "I understand that this cannot be undone.")
     press("Space")
     tab_to(page, "Publish")
     press("Enter")

@@ -8,7 +8,6 @@ from django.utils.safestring import SafeString
 from evaluator.metrics.protocol import metric_of
 from evaluator.metrics.registry import Metric
 from evaluator.scoring.results import format_rounded
-from evaluator.tables.sentences import p_cell
 from leaderboard.boards.rows import Entry
 from leaderboard.statistics.comparisons import Pair
 from leaderboard.web.boards import whiskers
@@ -29,7 +28,6 @@ class Gap(NamedTuple):
     interval: str
     size: str
     size_interval: str
-    p: str
     is_significant: bool
     why_not_tested: str
     is_waiting: bool
@@ -94,7 +92,6 @@ def gap_of(pair: Pair) -> Gap:
         interval=" to ".join(signed(end, decimals=decimals) for end in ends),
         size=sizes[0],
         size_interval=" to ".join(sizes[1:]),
-        p=p_cell(difference.p, difference.p_below) if difference else "",
         is_significant=bool(difference and difference.is_significant),
         why_not_tested=pair.withheld,
         is_waiting=difference is None,

@@ -78,8 +78,11 @@ def test_what_another_submission_of_the_method_surpasses_has_no_rank(
     )
     builders.score_all()
     root = look(signed_in, worse)
-    assert "Not the best: the board shows another" in root.one("main").text
+    shows = "would show" if visibility == "PRIVATE" else "shows"
+    assert f"Not the best of its method: the board {shows} another submission" in root.one("main").text
     assert "Rank" not in card(root)
+    assert not root.all("figure", class_="all-values"), "it is none of the values on the board"
+    assert "Columns of the LaTeX row: rank (none" in root.one("main").text
     assert "Rank" in card(look(signed_in, better))
 
 
