@@ -226,7 +226,10 @@ def test_withdrawn_entry_leaves_its_mark_in_a_former_edition(
     assert row.one("div", class_="name").text == f"M1.05 withdrawn {withdrawn_at:%Y-%m-%d}"
     assert {cell.text for cell in row.all("td")} - {""} == {"–"}
     notices = [each.text for each in root.all("p", class_="notice")]
-    assert "1 row was withdrawn by its team. The scores were removed from all editions." in notices
+    assert (
+        "1 submission was withdrawn by its team: its row stays without scores and rank in every edition."
+        in notices
+    )
 
 
 def test_every_page_that_stays_has_its_own_canonical_address(client: Client, replaced: Edition) -> None:
