@@ -1,4 +1,4 @@
-"""All settings, read from the environment and described in `docs/operations.md`.
+"""All settings, read from the environment and described in `docs/settings.md`.
 
 Two profiles: `embedded` (the default: SQLite, no broker, everything below `var/`) and `production`, in which
 a missing variable is an error.

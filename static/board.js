@@ -71,7 +71,7 @@ const address = (methods) => {
 };
 
 const words = (n) => {
-  if (n === 0) return `Tick 2 to ${MAX_METHODS} methods to compare them.`;
+  if (n === 0) return `Tick 2 to ${MAX_METHODS} methods.`;
   if (n === 1) return `1 method selected; tick at least one more.`;
   return n === MAX_METHODS ? `${n} methods selected, which is the maximum.` : `${n} of at most ${MAX_METHODS} methods selected.`;
 };
@@ -96,8 +96,9 @@ function show(methods, isAsked = false) {
     }),
   );
   const link = tray.querySelector("a");
-  link.hidden = methods.length < 2;
-  link.href = address(methods);
+  link.setAttribute("aria-disabled", String(methods.length < 2));
+  if (methods.length < 2) link.removeAttribute("href");
+  else link.href = address(methods);
   tray.querySelector("[data-clear]").hidden = methods.length === 0;
 }
 

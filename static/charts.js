@@ -38,21 +38,27 @@
     text: () => (mark) => mark.data.text,
     number: () => (value) => String(value).replace("-", "−"),
     texts: (places) => (value) => places.find(([place]) => Math.abs(place - value) < 1e-6)?.[1] ?? "",
-    // A name begins below its mark. It moves to the left where it would cross the next step or leave the drawing,
-    // below names before it that it would cover, and goes where there is no room for it.
+    // A name begins below its mark. It moves to the left where it would cross the next step or leave the drawing; where
+    // it would then read as the next mark's it ends below its own, or lies lower. It moves below names that it would
+    // cover, and goes where there is no room for it.
     below: (nexts, chart) => {
-      let placed;
+      let [placed, last] = [[], -1];
       return ({ dataIndex, rect, labelRect: { width, height } }) => {
-        if (!dataIndex) placed = [];
-        const left = rect.x + rect.width / 2;
-        const next = nexts[dataIndex] && chart.convertToPixel({ xAxisIndex: 0, yAxisIndex: 0 }, nexts[dataIndex])[0] - 6;
-        const dx = Math.min(0, Math.min(next ?? Infinity, chart.getWidth() - 8) - left - width);
+        if (dataIndex <= last) placed = [];
+        last = dataIndex;
+        const [left, own, bottom] = [rect.x + rect.width / 2, rect.x + rect.width, rect.y + rect.height];
+        const next = nexts[dataIndex] && chart.convertToPixel({ xAxisIndex: 0, yAxisIndex: 0 }, nexts[dataIndex]);
+        let [y, end] = [bottom, next ? next[0] - 6 : chart.getWidth() - 18];
+        if (left + width > end && (!next || Math.abs(next[1] - bottom - height) < height)) {
+          if (!next || own - width >= 40) end = own;
+          else y += height;
+        }
+        const dx = Math.min(0, end - left - width);
         const [from, to] = [left + dx, left + dx + width];
         if (from < 40) return { x: -1000 };
-        let y = rect.y + rect.height;
         while (placed.some((other) => other.from < to && from < other.to && Math.abs(other.y - y) <= height)) y += 2;
         placed.push({ from, to, y });
-        return { hideOverlap: true, dx, dy: y - rect.y - rect.height };
+        return { hideOverlap: true, dx, dy: y - bottom };
       };
     },
     whisker: (ink) => (_, api) => {

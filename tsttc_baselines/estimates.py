@@ -28,8 +28,8 @@ class Estimate:
 class Estimator(Protocol):
     """A baseline with its parameters.
 
-    What it really takes in place of a parameter, as where that is "auto", it may say in `used`, a dict of
-    parameters: the prediction file then has these.
+    If a parameter is "auto", `used` holds the value actually chosen: a dict of parameters, which the
+    prediction file then has.
     """
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:

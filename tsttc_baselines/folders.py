@@ -81,6 +81,7 @@ class SequenceFolder:
         return next((path for path in paths if path.exists()), paths[0])
 
     def where(self, path: Path) -> str:
+        """Return a path for messages: relative to the folder, if it lies in it."""
         return path.relative_to(self.path).as_posix() if path.is_relative_to(self.path) else str(path)
 
     def clip(self, row: int, *, cache: ImageCache, with_images: bool = True) -> Clip:

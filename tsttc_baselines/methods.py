@@ -44,6 +44,7 @@ class Parameter:
 
     @property
     def option(self) -> str:
+        """The option of the command, such as `--frame-gap`."""
         return "--" + self.name.replace("_", "-")
 
 
@@ -91,6 +92,7 @@ class Method:
         return "as published" if is_published else "variant"
 
     def estimator(self, parameters: Mapping[str, Value]) -> Estimator:
+        """Make the estimator with these parameters."""
         module, _, name = self.factory.partition(":")
         made: Estimator = getattr(import_module(module), name)(**parameters)
         return made

@@ -237,7 +237,7 @@ class Client:
         return self._get(Method, "methods", method_id)
 
     def visibility_preview(self, method_id: str, visibility: str) -> VisibilityPreview:
-        """Preview what everyone would see of an own method if it were "PUBLIC" or "ANONYMOUS"."""
+        """Preview what everyone would see of your own method if it were "PUBLIC" or "ANONYMOUS"."""
         return self._get(VisibilityPreview, "methods", method_id, "visibility", params={"as": visibility})
 
     def show_method(self, method_id: str, visibility: str, *, reveal_at: str | None = None) -> Method:

@@ -133,6 +133,7 @@ class Protocol:
 
     @property
     def primary(self) -> Metric:
+        """The metric that decides the ranks: the first one."""
         return self.metrics[0]
 
     @property

@@ -104,8 +104,8 @@ def _check_keys(members: Members, manifest: Manifest, findings: Findings, pointe
     if unknown:
         message = (
             f"{_n(len(unknown), 'key is', 'keys are')} not in the manifest: "
-            f"{listed([quoted(name) for name in unknown])}; expected its anno_ids, as plain decimal numbers, "
-            "or its natural keys bag_stamp/cam_id/ts/track_id."
+            f"{listed([quoted(name) for name in unknown])}; expected the manifest's anno_ids, as plain "
+            "decimal numbers, or its natural keys, bag_stamp/cam_id/ts/track_id."
         )
         findings.group("unknown-keys", message, pointer_of(unknown[0]), n_faults=len(unknown))
     require_once(names, findings, pointer_of)

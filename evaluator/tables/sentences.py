@@ -116,10 +116,10 @@ def influence(first: str, second: str, *, difference: Difference) -> str:
     >>> from evaluator.scoring.significance import Influence
     >>> difference = Difference(-0.4, -0.5, -0.2, 0.0003, influence=Influence(700, 39, 59))
     >>> print(influence("A", "B", difference=difference))
-    Without the 39 of 700 recordings on which A leads most, the difference is no longer significant. \
-Without 59 such recordings, B is better.
+    If the 39 of 700 recordings that most favour A are left out, the difference is no longer significant. \
+If 59 are left out, B is better.
     >>> influence("A", "B", difference=Difference(0.1, -0.2, 0.4, 0.4, influence=Influence(700, None, 2)))
-    'Without the 2 of 700 recordings on which B leads most, A is better.'
+    'If the 2 of 700 recordings that most favour B are left out, A is better.'
     """
     known = difference.influence
     if known is None or not difference.difference:
@@ -128,37 +128,35 @@ Without 59 such recordings, B is better.
     few, turn = known.n_to_undecided, known.n_to_turn
     if few is None and turn is None:
         return ""
-    of_all = f"of {in_words(difference.unit, known.n_units)} on which {better} leads most"
+    of_all = f"of {in_words(difference.unit, known.n_units)} that most favour {better} are left out"
     if few is None:
-        return f"Without the {turn:,} {of_all}, {worse} is better."
-    head = f"Without the {few:,} {of_all}, the difference is no longer significant."
-    if turn is None:
-        return head
-    such = in_words(difference.unit, turn).replace(" ", " such ")
-    return f"{head} Without {such}, {worse} is better."
+        return f"If the {turn:,} {of_all}, {worse} is better."
+    head = f"If the {few:,} {of_all}, the difference is no longer significant."
+    return head if turn is None else f"{head} If {turn:,} are left out, {worse} is better."
 
 
 def selection(n_tried: Mapping[str, int]) -> str:
     """Describe selection among submissions, by methods' numbers of scored submissions; empty without any.
 
     >>> print(selection({"A": 3, "B": 1, "C": 10}))
-    A is the best of 3 scored submissions, C of 10: the best of so many equally good variants looks better \
-than it is by about 0.60 and 1.09 standard errors of the difference of two of them.
+    A is the best of 3 scored submissions, C of 10. Picking the best of several equally good submissions \
+makes a method look better by chance: by about 0.60 standard errors of a difference for the best of 3, and \
+1.09 for the best of 10.
     """
     chosen = {name: n for name, n in n_tried.items() if n > 1}
     if not chosen:
         return ""
-    numbers = list(chosen.values())
     (name, n), *rest = chosen.items()
     who = ", ".join(
         [f"{name} is the best of {n:,} scored submissions", *(f"{each} of {m:,}" for each, m in rest)]
     )
-    many = "so many" if rest else f"{n:,}"
-    amounts = [f"{best_of(each):.2f}" for each in numbers]
-    listed = amounts[0] if not rest else f"{', '.join(amounts[:-1])} and {amounts[-1]}"
+    first, *others = sorted(set(chosen.values()))
+    amounts = [f"{best_of(first):.2f} standard errors of a difference for the best of {first:,}"]
+    amounts += [f"{best_of(each):.2f} for the best of {each:,}" for each in others]
+    listed = ", and ".join([", ".join(amounts[:-1]), amounts[-1]] if others else amounts)
     return (
-        f"{who}: the best of {many} equally good variants looks better than it is by about {listed} "
-        "standard errors of the difference of two of them."
+        f"{who}. Picking the best of several equally good submissions makes a method look better by chance: "
+        f"by about {listed}."
     )
 
 

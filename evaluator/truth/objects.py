@@ -53,6 +53,7 @@ class Objects:
         )
 
     def to_columns(self) -> tuple[list[float | None], list[bool | None], list[list[float] | None]]:
+        """Return occlusion, lane and box of every sequence; None where there is none."""
         return (
             [None if math.isnan(value) else value for value in _items(self.occ_ratio)],
             [None if math.isnan(value) else value == 1 for value in _items(self.same_lane)],
@@ -61,6 +62,7 @@ class Objects:
 
     @property
     def box_height(self) -> Floats | None:
+        """The heights of the boxes, as parts of the height of the image; None without boxes."""
         return None if self.box2d is None else self.box2d[:, 3] - self.box2d[:, 1]
 
 

@@ -56,7 +56,7 @@ class UnknownColumn(ValueError):
     def __init__(self, column: str, *, known: Sequence[str]) -> None:
         self.on_page = (
             f"This board has no column “{column[:60]}” to sort by. It is sorted by rank. "
-            "Click a column head to sort."
+            "Select a column heading to sort."
         )
         super().__init__(
             f"The board cannot be sorted by {column!r}; expected one of {', '.join(known)}, "

@@ -64,7 +64,10 @@ class Change:
 
 
 def changes(before: Sequence[Entry], after: Sequence[Entry]) -> list[Change]:
-    """Return the rows that are new, gone or withdrawn, or have another rank or value, by their rank now."""
+    """Return the rows that are new, gone or withdrawn, or have another rank or value, by their rank now.
+
+    A row that came and was withdrawn in between is none of them.
+    """
     former, present = ({entry.id: entry for entry in rows} for rows in (before, after))
     pairs = [Change(former.get(key), present.get(key)) for key in present | former]
     changed = [pair for pair in pairs if _state(pair.before) != _state(pair.after)]
@@ -72,7 +75,7 @@ def changes(before: Sequence[Entry], after: Sequence[Entry]) -> list[Change]:
 
 
 def _state(entry: Entry | None) -> tuple[object, ...] | None:
-    return (entry.rank, entry.value, entry.withdrawn_at) if entry else None
+    return (entry.rank, entry.value) if entry and not entry.withdrawn_at else None
 
 
 def _order(entry: Entry) -> tuple[bool, int, str]:

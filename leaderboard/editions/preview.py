@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from datetime import datetime
 from typing import Any
 from uuid import UUID
 
@@ -26,6 +27,7 @@ class Change:
     submission_id: UUID
     method: str
     team: str
+    submitted_at: datetime
     is_seen_by_all: bool
     old_status: str
     new_status: str
@@ -217,6 +219,7 @@ def _change(submission: Submission, old: _Side, new: _Side) -> Change:
         submission_id=submission.pk,
         method=submission.method.name,
         team=submission.method.team.name,
+        submitted_at=submission.submitted_at,
         is_seen_by_all=submission.method.was_shown(),
         old_status=old.status(submission),
         new_status=new.status(submission),

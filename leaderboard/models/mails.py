@@ -11,11 +11,11 @@ class MailKind(models.TextChoices):
     """What a mail is about. A person can switch off every kind but the first."""
 
     ACCOUNT = "account", "Your account"
-    SCORED = "scored", "A file that I submitted on the site is scored, rejected or failed"
+    SCORED = "scored", "A file that I submitted on the site is scored, is rejected or fails"
     EDITION = "edition", "A board with methods of my team has a new edition"
     TOKEN = "token", "One of my API tokens expires within a week"
     DEADLINE = "deadline", "A split that my team submitted to closes within three days"
-    ANNOUNCEMENT = "announcement", "A split that my team submitted to has an announcement"
+    ANNOUNCEMENT = "announcement", "There is an announcement about a split that my team submitted to"
 
 
 class Mail(models.Model):

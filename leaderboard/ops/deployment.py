@@ -25,9 +25,7 @@ def check_variables(app_configs: object = None, **kwargs: Any) -> list[CheckMess
         return messages
     messages += [Error(sentence, id="leaderboard.E002") for sentence in _addresses()]
     if environment.PROCESS == "web" and not settings.SENDS_MAIL:
-        message = (
-            "TSTTC_EMAIL_URL is not set: mails are printed to the log, and nobody has to prove an address."
-        )
+        message = "TSTTC_EMAIL_URL is not set: mails go to standard output, and no address is confirmed."
         messages.append(Caution(message, id="leaderboard.W003"))
     return messages
 

@@ -144,7 +144,7 @@ def required(name: str, *, embedded: Any, by: Collection[str] = PROCESSES, elsew
     if not PRODUCTION:
         return env.str(name, default=embedded)
     if PROCESS in by and not env.str(name, default=""):
-        FAULTS.append(f"{name} is not set. In production it has no default; docs/operations.md describes it.")
+        FAULTS.append(f"{name} is not set. In production it has no default; docs/settings.md describes it.")
     return env.str(name, default="") or elsewhere
 
 

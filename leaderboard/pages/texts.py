@@ -61,6 +61,7 @@ def default_text(name: str) -> str:
         "site_url": settings.SITE_URL,
         "contact": settings.CONTACT_EMAIL,
         "session_days": settings.SESSION_COOKIE_AGE // 86_400,
+        "providers": settings.SOCIALACCOUNT_PROVIDERS,
     }
     return render_to_string(f"pages/{PAGES[name].name}.md", facts).strip() + "\n"
 

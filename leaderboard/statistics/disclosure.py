@@ -105,8 +105,8 @@ def why_withheld(first: Entry, second: Entry, *, edition: Edition) -> str:
     for entry in (first, second):
         if entry.visibility == Visibility.ANONYMOUS and not entry.is_mine:
             return (
-                f"No confidence interval and no p-value: {entry.method} is anonymous, and "
-                "these numbers could reveal its team. They appear once the method is public."
+                f"Differences to {entry.method} have no interval or p-value until it is public, because they "
+                "could reveal its team."
             )
     if not edition.split.is_hidden:
         return ""

@@ -46,7 +46,7 @@ class SiteForm(forms.Form):
 def confirmation() -> forms.BooleanField:
     """Return the tick that every step without a way back asks for."""
     return forms.BooleanField(
-        label="I know that this cannot be undone.",
+        label="I understand that this cannot be undone.",
         error_messages={"required": "Confirm that this cannot be undone: tick the box."},
     )
 

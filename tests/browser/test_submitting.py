@@ -47,7 +47,7 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     page.wait_for_url("**/accounts/signup/?next=*")
     for label, text in (
         ("Email", "keys@example.org"),
-        ("Name shown on the board", "Keyboard team"),
+        ("Name shown on the board (optional)", "Keyboard team"),
         ("Password", PASSWORD),
         ("Password (again)", PASSWORD),
     ):
@@ -82,7 +82,7 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     tab_to(page, "Preview")
     press("Enter")
     page.wait_for_url("**/visibility/?*visibility=PUBLIC*")
-    tab_to(page, "I know that this cannot be undone.")
+    tab_to(page, "I understand that this cannot be undone.")
     press("Space")
     tab_to(page, "Publish")
     press("Enter")

@@ -24,7 +24,8 @@ NO_ZERO = "The value is 0; expected a time to contact other than 0, negative whe
 TOO_DEEP = "Objects and lists are nested deeper than 32 levels; expected 2, or a few in meta."
 EXPECTED_SECONDS = "expected a number of seconds."
 EXPECTED_KEYS = (
-    "expected its anno_ids, as plain decimal numbers, or its natural keys bag_stamp/cam_id/ts/track_id."
+    "expected the manifest's anno_ids, as plain decimal numbers, or its natural keys, "
+    "bag_stamp/cam_id/ts/track_id."
 )
 
 CASES: dict[str, tuple[Any, ...]] = {

@@ -73,7 +73,7 @@ class Visitor:
         assert link
         path = f"{link[0]}visibility/"
         preview = self.get(f"{path}?visibility=PUBLIC")
-        assert "I know that this cannot be undone." in preview.text
+        assert "I understand that this cannot be undone." in preview.text
         answer = self.post_form(path, {"visibility": "PUBLIC", "confirm": "on"})
         assert answer.url.path == link[0], answer.text
 

@@ -40,7 +40,7 @@ def correlation(client: Client, *methods: UUID) -> float | None:
     assert gap["difference"] is not None
     if gap["low"] is None:
         assert (gap["high"], gap["p"], gap["p_below"]) == (None, None, None)
-        assert "is anonymous" in answer["pairs"][0]["withheld"]
+        assert "could reveal its team" in answer["pairs"][0]["withheld"]
         return None
     between = gap["high"] - gap["low"]
     return float((widths[0] ** 2 + widths[1] ** 2 - between**2) / (2 * widths[0] * widths[1]))

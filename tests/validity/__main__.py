@@ -1,4 +1,4 @@
-"""Print the tables of `docs/uncertainty.md`, or some by name: `python -m tests.validity coverage days`."""
+"""Print the tables of `docs/validation.md`, or some by name: `python -m tests.validity coverage days`."""
 
 import argparse
 import sys

@@ -133,6 +133,11 @@ class OwnersAddress(forms.BaseSignupForm):
 
 
 class SignupForm(OwnersAddress, forms.SignupForm):
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        confirmed = "We will send a code to it. " if settings.SENDS_MAIL else ""
+        self.fields["email"].help_text = f"{confirmed}Your team and the maintainers see it."
+
     def clean(self) -> dict[str, Any]:
         # A bad password and two different ones are reported at once.
         cleaned: dict[str, Any] = super().clean()

@@ -18,7 +18,7 @@ from leaderboard.web.forms import SiteForm
 
 def _splits() -> list[tuple[str, str]]:
     names = Split.objects.shown().values_list("pk", flat=True)
-    return [("", "all splits"), *((name, f"{name} only") for name in names)]
+    return [("", "all"), *((name, name) for name in names)]
 
 
 class TokenForm(SiteForm):
@@ -31,8 +31,8 @@ class TokenForm(SiteForm):
         label="Scope",
         widget=forms.CheckboxSelectMultiple,
         choices=[
-            (Scope.SUBMIT, "Submit and withdraw files, edit and publish methods"),
-            (Scope.READ, "Read results"),
+            (Scope.SUBMIT, "submit: send and withdraw files, edit and publish methods"),
+            (Scope.READ, "read: see submissions and results"),
         ],
         initial=list(Scope.values),
         error_messages={"required": "The token has no scope; expected read, submit, or both."},

@@ -58,7 +58,7 @@ def rank_ladder(entries: Iterable[Entry], *, primary: str) -> Ladder | None:
     shown = ranked[:MAX_STEPS]
     n_ranks = max(high for _, _, high, _ in shown)
     # A rank is a step of width 1 and its value the middle: rank 1 goes from 0 to 1.
-    scale = WhiskerScale(0.0, float(n_ranks))
+    scale = WhiskerScale(0.0, float(n_ranks), margin=2.0)
     steps = tuple(
         Step(entry, low, high, whiskers.whisker(scale, rank - 0.5, (low - 1.0, float(high))))
         for rank, low, high, entry in shown

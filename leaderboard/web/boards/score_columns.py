@@ -26,7 +26,7 @@ from leaderboard.web.formatting import interval_words
 
 SCORED_DECIMALS: Final = 2
 NOTHING: Final = SafeString("")
-MARKED: Final = "statistically tied for best in its column (95% confidence)"
+MARKED: Final = "may be the best of its column (95% confidence)"
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,7 @@ class Cell:
     range_css: str = ""  # as the heading's
     is_best: bool = False
     is_second: bool = False
-    is_with_best: bool = (
-        False  # statistically tied for best in its column (95% confidence): its rank range begins at 1
-    )
+    is_with_best: bool = False  # may be the best of its column: its rank range begins at 1
     interval: str = ""  # in words
     whisker: SafeString = NOTHING
     has_room: bool = False  # for a whisker: its column has one, though this value may have none

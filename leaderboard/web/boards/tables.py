@@ -1,7 +1,7 @@
 """The table of a board. Templates only place strings: number filters cost more than the query."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date, datetime, timedelta
 from typing import Final
 from uuid import UUID
@@ -93,11 +93,11 @@ class BoardTable:
     score_headings: tuple[Heading, ...]
     primary: str  # the symbol of the metric that ranks
     rows: tuple[BoardRow, ...]
-    moved_since: date | None  # None where no rank has moved
-    sources: list[tuple[str, str]]  # what published rows are quoted from: citation and address
+    moved_since: datetime | None  # None where no rank has moved
+    sources: Sequence[tuple[str, ...]]  # of published rows: citation before, in and after its title; address
     ttc_ranges: list[tuple[TTCRange, int | None]]  # with the number of sequences in each
     pages: "Page[Entry]"
-    has_intervals: bool
+    has_intervals: bool  # beside its whiskers
     has_one_whisker: bool  # in a column of its own before all numbers
     is_log: bool  # whether every whisker is on a logarithmic scale
     can_compare: bool
@@ -140,8 +140,9 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
     has_intervals = any(ends_of(entry, name) for entry in board.entries for name in names)
     scales = _scales(board.entries, names if is_of_one and has_intervals else names[:1])
     pages = Paginator(board.entries, PER_PAGE).get_page(query.page)
-    sources = sorted({entry.source: entry.paper_url for entry in pages.object_list if entry.source}.items())
-    numbers = {citation: i for i, (citation, _) in enumerate(sources, 1)}
+    quoted = [entry for entry in pages.object_list if entry.source]
+    sources = sorted({(*entry.source.partition(entry.source_title), entry.paper_url) for entry in quoted})
+    numbers = {"".join(source[:3]): i for i, source in enumerate(sources, 1)}
     edition = board.edition
     is_present = edition is not None and edition.pk == board.split.current_edition_id and not board.at
     counts = edition.ground_truth.counts if edition else {}
@@ -177,11 +178,11 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
         ),
         primary=board.rules.primary.symbol,
         rows=rows,
-        moved_since=movement.since(now=now).date() if any(row.moved for row in rows) else None,
+        moved_since=movement.since(now=now) if any(row.moved for row in rows) else None,
         sources=sources,
         ttc_ranges=counted_ranges(board.rules, counts),
         pages=pages,
-        has_intervals=has_intervals,
+        has_intervals=has_intervals and bool(scales),
         can_compare=is_present and sum(row.can_be_compared for row in rows) > 1,
         reason=_reason(board, has_intervals=has_intervals),
         floor=floor_sentence(edition.floor, decimals=edition.decimals) if edition else "",
@@ -225,7 +226,7 @@ def _reason(board: Board, *, has_intervals: bool) -> str:
 
 
 def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, WhiskerScale]:
-    """Return a scale for each of these columns, the same on all pages."""
+    """Return one scale for these columns, with the best of each, the same on all pages."""
     scales = {}
     for name in names:
         values = [(value, entry) for entry in entries if (value := entry.scores[name]) is not None]
@@ -237,7 +238,8 @@ def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, Whisker
         scale = whiskers.scale_of([value for value, _ in public], known, best=band)
         if scale is not None:
             scales[name] = scale
-    return scales
+    limits = [end for scale in scales.values() for end in (scale.low, scale.high)]
+    return {name: replace(scale, low=min(limits), high=max(limits)) for name, scale in scales.items()}
 
 
 def _range_choices(names: Sequence[str], query: BoardQuery) -> tuple[tuple[str, str, bool], ...]:

@@ -6,7 +6,7 @@ Drawings are sized in percent, so the same bytes fit every screen; the cell has 
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from django.utils.html import format_html, format_html_join
@@ -35,6 +35,7 @@ class WhiskerScale:
     low: float
     high: float
     best: Ends | None = None
+    margin: float = field(default=_MARGIN, repr=False)
 
     @property
     def is_log(self) -> bool:
@@ -51,7 +52,7 @@ class WhiskerScale:
             share = math.log(clamped / self.low) / math.log(self.high / self.low)
         else:
             share = (clamped - self.low) / (self.high - self.low)
-        return round(_MARGIN + (100.0 - 2 * _MARGIN) * share, 1)
+        return round(self.margin + (100.0 - 2 * self.margin) * share, 1)
 
     def labels(self) -> tuple[float, ...]:
         """Return the round numbers of the scale that have room for their text.

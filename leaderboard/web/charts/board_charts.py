@@ -29,9 +29,10 @@ from leaderboard.web.charts.chart_options import (
     x_axis,
 )
 from leaderboard.web.charts.chart_series import Look, marks, named_marks, staircase
+from leaderboard.web.charts.range_leaders import listed
 
 # Below the front, where its names are: this part of the whole height.
-_ROOM: Final = 0.15
+_ROOM: Final = 0.2
 # Before the fastest, so that no mark lies on the axis.
 _BESIDE: Final = 0.03
 SUBMITTED, QUOTED = "Submissions", "Published results"
@@ -43,6 +44,8 @@ MIN_DATES: Final = 3
 _MIN_LATENCIES: Final = 3
 # Up to so many points have room for a name each.
 _FEW_POINTS: Final = 5
+_OF_YEARS: Final = "Rows quoted from papers are placed in the middle of their year."
+_OF_LATENCY: Final = "Latency is self-reported on different hardware."
 
 
 # --- a front and what lies behind it ---------------------------------------------------------------------
@@ -90,12 +93,14 @@ def _drawn(points: Sequence[_Placed], metric: Metric) -> tuple[list[_Placed], st
 
 def _front_series(
     points: Sequence[_Placed], metric: Metric, *, line: str, praise: str, end: float
-) -> tuple[list[Option], list[str]]:
-    """Return the series of submissions and of published results, and the legend's names."""
+) -> tuple[list[Option], list[str], dict[str, str]]:
+    """Return the series of submissions and of published results, the legend's names, and its own keys."""
     front = [each for each in points if each.is_front]
     series = [staircase(line, [*((each.x, each.y) for each in front), (end, front[-1].y)])]
-    # A front of one point is a line only if it goes on to the end.
-    names = [line] if len(front) > 1 or end > front[-1].x else []
+    names = [line]
+    # A front of one point is a line only if it goes on to the end; the legend shows its mark.
+    is_line = len(front) > 1 or end > front[-1].x
+    keys = {} if is_line else {line: "circle" if front[0].entry.kind == "submission" else "diamond"}
     for kind, name, symbol in (("submission", SUBMITTED, "circle"), ("published", QUOTED, "diamond")):
         of_kind = [each for each in points if each.entry.kind == kind]
         if not of_kind:
@@ -111,7 +116,7 @@ def _front_series(
         ahead = [i for i, each in enumerate(front) if each.entry.kind == kind]
         drawn = [each.mark(praise, metric) for each in front]
         series.append(named_marks(name, drawn, ahead, Look("--s1", symbol, 11.0)))
-    return series, names
+    return series, names, keys
 
 
 def _value_cells(points: Sequence[_Placed]) -> list[SafeString]:
@@ -181,7 +186,7 @@ def progress(
     points, note = _drawn(_with_front(placed), metric)
     today = _day(now)
     first, last = _time_range([*days, today], years)
-    series, names = _front_series(
+    series, names, keys = _front_series(
         points, metric, line="Best so far", praise="the best when it came", end=max(_ms(today), points[-1].x)
     )
     frame = Frame(
@@ -189,6 +194,7 @@ def progress(
         y_axes=[error_axis(metric, [each.y for each in points], room=_ROOM)],
         series=series,
         names=names,
+        keys=keys,
         more=ZOOMABLE,
     )
     return Chart(
@@ -202,7 +208,7 @@ def progress(
         ),
         numbers=(3,),
         is_zoomable=True,
-        note=note,
+        note=f"{note} {_OF_YEARS if years else ''}".strip(),
     )
 
 
@@ -273,30 +279,34 @@ def _time_title(first: datetime, last: datetime) -> str:
 
 def latency(entries: Sequence[Entry], *, metric: Metric) -> Chart:
     """Draw the metric that ranks against latency, with the Pareto front; empty with few latencies."""
+    ranked = [entry for entry in entries if entry.is_visible_to_all and entry.value is not None]
     points, note = _drawn(
         _with_front(
             (
                 latency_ms,
-                value,
+                entry.value or 0.0,
                 entry,
                 f"{latency_ms:g} ms on {entry.details['hardware'] or 'unknown hardware'}",
             )
-            for entry in entries
-            if entry.is_visible_to_all
-            and (latency_ms := entry.details["latency_ms"]) is not None
-            and (value := entry.value) is not None
+            for entry in ranked
+            if (latency_ms := entry.details["latency_ms"]) is not None
         ),
         metric,
     )
     if len(points) < _MIN_LATENCIES:
         return empty("latency")
     last = max(each.x for each in points if each.is_front)
-    series, names = _front_series(points, metric, line="Pareto front", praise="on the Pareto front", end=last)
+    series, names, keys = _front_series(
+        points, metric, line="Pareto front", praise="on the Pareto front", end=last
+    )
+    untimed = [entry.method for entry in ranked if entry.details["latency_ms"] is None]
+    missing = f"No latency is given for {listed(untimed)}." if untimed else ""
     frame = Frame(
         x_axes=[x_axis("Latency in ms (log scale)", log_axis((each.x for each in points), room=_BESIDE))],
         y_axes=[error_axis(metric, [each.y for each in points], room=_ROOM)],
         series=series,
         names=names,
+        keys=keys,
     )
     return Chart(
         kind="latency",
@@ -316,5 +326,5 @@ def latency(entries: Sequence[Entry], *, metric: Metric) -> Chart:
             for each, value in zip(points, _value_cells(points), strict=True)
         ),
         numbers=(2, 4),
-        note=note,
+        note=" ".join(each for each in (_OF_LATENCY, missing, note) if each),
     )

@@ -28,6 +28,8 @@ _STACKED_PX: Final = {2: 704, 3: 896}
 _HEAD_PX: Final = 50
 _BETWEEN: Final = (1.2, 1.5, 3, 4, 6, 8)
 _LEFT_PX: Final = 44
+# So many ranks stand beside each other on a phone; of more, it leaves some out.
+_MAX_RANKS: Final = 13
 QUIET: Final = {"color": "--quiet", "fontSize": 11, "lineHeight": 14}
 TEXT: Final = {"color": "--ink", "fontSize": 12}
 
@@ -185,7 +187,7 @@ def names_axis(names: Sequence[str]) -> Option:
 
 def ranks_axis(names: Sequence[str], *, name: str = "", is_upright: bool = False) -> Option:
     """Make an axis of a heat map, at the left or above."""
-    label: Option = {**QUIET}
+    label: Option = {**QUIET} | ({"interval": 0} if len(names) <= _MAX_RANKS else {})
     if is_upright:
         label = {**TEXT, "interval": 0, "overflow": "truncate", "ellipsis": "…"}
     hidden = {"show": False}

@@ -59,7 +59,9 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
 
 def _resolution(board: Board, pairs: Sequence[Pair]) -> list[tuple[str, list[str]]]:
     """Return by TTC range the smallest difference that the board can detect, in each metric."""
-    known = sentences.resolutions([pair.differences or {} for pair in comparisons.neighbours(pairs)])
+    tested = [pair.differences for pair in comparisons.neighbours(pairs)]
+    # A median of some would change with each that comes.
+    known = sentences.resolutions([each for each in tested if each]) if None not in tested else {}
     decimals = board.edition.decimals if board.edition else 2
     rows: dict[str, list[str]] = {}
     for names in grouped_names(board.rules.score_names).values():

@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 from typing import Final
 
@@ -72,6 +73,7 @@ def sweep(shown: PrintedTable) -> Chart:
             )
         ],
         names=names,
+        keys=dict(zip(names, SERIES_SYMBOLS, strict=False)),
     )
     symbols = " and ".join(metric.symbol for metric in metrics)
     return Chart(
@@ -101,10 +103,11 @@ def _series(
         )
         for x, y, row in points
     ]
-    drawn = marks(legend, setting_marks, Look(SERIES_INKS[index], SERIES_SYMBOLS[index], 8.0), grid=grid)
+    look = Look(SERIES_INKS[index], SERIES_SYMBOLS[index])
+    drawn = marks(legend, setting_marks, look, grid=grid)
     for item, (*_, row) in zip(drawn["data"], points, strict=True):
         if row.is_default:
-            item["symbolSize"] = 13.0
+            item["itemStyle"] = replace(look, is_hollow=True).style() | {"borderWidth": 1.75}
     return [line(legend, [(x, y) for x, y, _ in points], SERIES_INKS[index], grid=grid), drawn]
 
 

@@ -7,10 +7,8 @@ from urllib.parse import urlencode
 
 from django.urls import reverse
 
-from evaluator import Difference
 from evaluator.counting import counted
 from evaluator.metrics.protocol import metric_of
-from evaluator.metrics.registry import Metric
 from evaluator.tables.sentences import p_cell
 from leaderboard.boards.rows import Entry
 from leaderboard.models import Visibility
@@ -24,6 +22,10 @@ _MAX_NAMED: Final = 3
 SIGNIFICANT: Final = {0.001: "p < 0.001", 0.01: "p < 0.01", 0.05: "p < 0.05"}
 UNDECIDED, COMPUTING = "not significant", "computing…"
 ANONYMOUS, UNTESTED = "no test (anonymous)", "no test"
+_WHY_ANONYMOUS: Final = (
+    "Anonymous methods have a rank range but are not tested in pairs, because a test against one method "
+    "could reveal the team."
+)
 _INKS: Final = dict(
     zip(
         (*SIGNIFICANT.values(), UNDECIDED, ANONYMOUS, UNTESTED, COMPUTING),
@@ -41,40 +43,31 @@ class _Cell:
     split: str
 
     @property
-    def difference(self) -> Difference | None:
-        """Return the difference in the score that ranks; None until a worker has computed it."""
-        return self.pair.difference
-
-    @property
-    def metric(self) -> Metric:
-        """Return the metric that ranks."""
-        return metric_of(self.pair.first.primary)
-
-    @property
     def verdict(self) -> str:
         """Return the class of its p-value, or why there is none."""
-        if self.difference is None:
+        difference = self.pair.difference
+        if difference is None:
             return COMPUTING
-        if self.difference.p_below is None:
+        if difference.p_below is None:
             shown = (self.pair.first.visibility, self.pair.second.visibility)
             return ANONYMOUS if Visibility.ANONYMOUS in shown else UNTESTED
-        return SIGNIFICANT.get(self.difference.p_below, UNDECIDED)
+        return SIGNIFICANT.get(difference.p_below, UNDECIDED)
 
     def texts(self) -> tuple[str, str, str]:
         """Return difference, interval and p."""
-        if self.difference is None:
+        difference, decimals = self.pair.difference, self.pair.first.decimals
+        if difference is None:
             return COMPUTING, "", ""
-        decimals = self.pair.first.decimals
-        difference = signed(self.difference.difference, decimals=decimals)
-        if self.difference.low is None or self.difference.high is None:
-            return difference, "", UNTESTED
-        ends = (signed(end, decimals=decimals) for end in (self.difference.low, self.difference.high))
-        return difference, " to ".join(ends), p_cell(self.difference.p, self.difference.p_below)
+        text = signed(difference.difference, decimals=decimals)
+        if difference.low is None or difference.high is None:
+            return text, "", UNTESTED
+        ends = (signed(end, decimals=decimals) for end in (difference.low, difference.high))
+        return text, " to ".join(ends), p_cell(difference.p, difference.p_below)
 
     def mark(self) -> Mark:
         difference, interval, p = self.texts()
         first, second = self.pair.first, self.pair.second
-        words = f"{self.metric.symbol} {difference}" + (f" ({interval})" if interval else "")
+        words = f"{metric_of(first.primary).symbol} {difference}" + (f" ({interval})" if interval else "")
         read = [f"{_named(first)} vs. {_named(second)}", words]
         read += [f"p {p}: {self.verdict}"] if interval else [self.pair.withheld or self.verdict]
         query = urlencode({"split": self.split, "m": [first.method_id, second.method_id]}, doseq=True)
@@ -116,6 +109,7 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
         rows=tuple((_named(cell.pair.first), _named(cell.pair.second), *cell.texts()) for cell in pair_cells),
         numbers=(2, 4),
         is_low=len(entries) <= _FEW,
+        note=_WHY_ANONYMOUS if ANONYMOUS in verdicts else "",
     )
 
 
@@ -123,27 +117,30 @@ def alike_words(pairs: Sequence[Pair]) -> str:
     """Say which tested pairs do not differ significantly; empty without a tested pair."""
     tested = [pair for pair in pairs if pair.difference and pair.difference.p_below is not None]
     alike = [pair for pair in tested if not pair.difference.is_significant]  # type: ignore[union-attr]  # tested
+    n_waiting = sum(pair.differences is None for pair in pairs)
+    rest = f" Still computing: {counted(n_waiting, 'pair')}." if n_waiting else ""
     if not tested:
         return ""
-    if not alike:
-        return "All tested pairs differ significantly (p\u00a0<\u00a00.05)."
     if len(alike) > _MAX_NAMED:
         n_tested = counted(len(tested), "tested pair")
-        return f"{len(alike)} of {n_tested} do not differ significantly (p\u00a0≥\u00a00.05)."
+        return f"{len(alike)} of {n_tested} do not differ significantly (p\u00a0≥\u00a00.05).{rest}"
     named = [
         " and ".join(f"{entry.method} (rank {entry.rank})" for entry in (pair.first, pair.second))
         for pair in alike
     ]
-    return f"All tested pairs differ significantly (p\u00a0<\u00a00.05), except {'; '.join(named)}."
+    but = f", except {'; '.join(named)}" if named else ""
+    those = "pairs tested so far" if n_waiting else "tested pairs"
+    return f"All {those} differ significantly (p\u00a0<\u00a00.05){but}.{rest}"
 
 
 def _series(name: str, pair_cells: Sequence[_Cell]) -> Option:
     series = cells(name, [cell.mark() for cell in pair_cells], _INKS[name])
     for item, cell in zip(series["data"], pair_cells, strict=True):
-        item["text"] = "" if cell.difference is None else cell.texts()[0]
-    if name in (ANONYMOUS, UNTESTED):
+        item["text"] = "" if cell.pair.difference is None else cell.texts()[0]
+    if name in (ANONYMOUS, UNTESTED, COMPUTING):
         # Nearly the ground: the outline tells it apart, above the rims of the cells beside it.
-        series |= {"itemStyle": {"color": _INKS[name], "borderColor": "--quiet", "borderWidth": 1}, "z": 3}
+        rim = "--doubt" if name == COMPUTING else "--quiet"
+        series |= {"itemStyle": {"color": _INKS[name], "borderColor": rim, "borderWidth": 1}, "z": 3}
     ink = "--ground" if name == SIGNIFICANT[0.001] else "--ink"
     return series | {"label": {"show": True, "color": ink, "fontSize": 11, "formatter": call("text")}}
 

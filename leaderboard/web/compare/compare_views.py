@@ -8,6 +8,8 @@ from django.shortcuts import render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
+from evaluator.metrics.protocol import metric_of
+from evaluator.scoring.results import format_rounded
 from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.http_caching import cacheable
@@ -74,16 +76,19 @@ def _drawn(request: HttpRequest, compared: comparisons.Compared) -> HttpResponse
 def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None) -> dict[str, object]:
     board = snapshots.board(split=split, viewer=request.user)
     entries = [entry for entry in board.entries if entry.method_id and entry.value is not None]
+    names = board.rules.overall_names
     # A method's page asks for the choice of others beside it.
     chosen = [*request.GET.getlist("m"), *request.GET.getlist("with")]
     return {
         "split": split,
         "board_split": split.pk,
-        "entries": [
-            entry for i, entry in enumerate(entries) if i < MAX_OFFERED or str(entry.method_id) in chosen
+        "rows": [
+            (entry, [format_rounded(entry.scores[name], decimals=entry.decimals) for name in names])
+            for i, entry in enumerate(entries)
+            if i < MAX_OFFERED or str(entry.method_id) in chosen
         ],
         "n_in_all": len(entries),
-        "metric": board.rules.primary,
+        "metrics": list(map(metric_of, names)),
         "chosen": chosen,
         "max_methods": comparisons.MAX_METHODS,
         "refusal": refusal,

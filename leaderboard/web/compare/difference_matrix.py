@@ -40,10 +40,6 @@ class Matrix(NamedTuple):
     axis: SafeString
     n_tested: int
 
-    @property
-    def best(self) -> Entry:
-        return self.rows[0][0]
-
 
 def best_entry(entries: Sequence[Entry]) -> Entry:
     """Return the entry with the lowest score that ranks."""
@@ -126,6 +122,9 @@ def _forest(
     # None is better than the best: the scale begins at 0, or where an interval does.
     below = [-each.low for _, each in to_best if each.low is not None and each.low < 0]
     start = -svg.scale_end(below) if below else 0.0
+    if not to_best:
+        return (), SafeString()
+    origin = ForestRow(best, svg.difference(end, 0.0, None, None, start=start), "0", "")
     rows = tuple(
         ForestRow(
             entry=entry,
@@ -135,7 +134,7 @@ def _forest(
         )
         for entry, each in to_best
     )
-    return rows, svg.axis(end, start=start)
+    return (origin, *rows), svg.axis(end, start=start)
 
 
 def interval_of(difference: Difference, *, decimals: int) -> str:

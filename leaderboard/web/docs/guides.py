@@ -34,6 +34,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Command line": "cli",
         "Python": "python",
         "Python reference": "python-reference",
+        "Baselines reference": "baselines-reference",
         "CI": "ci",
         "API guide": "api-guide",
         "API reference": "",
@@ -45,6 +46,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
     "The numbers": {
         "Scoring": "scoring",
         "Uncertainty": "uncertainty",
+        "Validation": "validation",
         "Editions": "editions",
         "Changelog": "changelog",
     },
@@ -52,6 +54,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Quick start for maintainers": "hosting",
         "Maintenance": "maintainers",
         "Operations": "operations",
+        "Settings": "settings",
         "Host another dataset": "another-dataset",
         "Capacity": "capacity",
         "Security": "security",
@@ -60,8 +63,6 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
     },
     "For developers": {"Overview": "overview", "Architecture": "architecture", "Decisions": "decisions"},
 }
-_PYTHON: Final = "python-reference"
-"""The guide that has the reference of the packages."""
 # Pages that a guide names by their paths, and that anybody may ask for.
 _PAGES: Final = frozenset(
     (
@@ -134,8 +135,8 @@ def guide(name: str) -> Document:
     """Render a guide, once in a process. Raises `KeyError`."""
     path = files()[name]
     text = path.read_text(encoding="utf-8").replace(api_examples.SITE, settings.SITE_URL)
-    if name == _PYTHON:
-        text = f"{text}\n{python_reference.text()}"
+    if name in python_reference.SECTIONS:
+        text = f"{text}\n{python_reference.text(name)}"
 
     def link(address: str) -> str:
         return _link(address, source=path)

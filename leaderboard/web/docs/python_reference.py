@@ -1,11 +1,11 @@
-"""The reference of the Python packages, as Markdown below the guide `docs/python-reference.md`.
+"""The references of the Python packages, as Markdown below their guides.
 
 It reads the sources and imports nothing: a server has neither OpenCV nor torch, which some modules need.
 """
 
 import ast
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -14,68 +14,109 @@ from django.conf import settings
 from django.utils.text import slugify
 
 _ROOT: Final = Path(settings.BASE_DIR)
-_MAX_WIDTH: Final = 88
+_MAX_WIDTH: Final = 76
 # The default of a dataclass's field, where it is written as a call.
 _FIELD: Final = re.compile(r"\bfield\((?:default=([\w.]+))?.*\)$")
 
-SECTIONS: Final[dict[str, dict[str, tuple[str, ...]]]] = {
-    "results of evaluator": {
-        "evaluator.client.answers": (
-            *("Account", "Board", "BoardEntry", "Compared", "ConfidenceInterval", "Method", "Pair"),
-            *("Queue", "Quota", "Submission", "VisibilityPreview"),
-            *("BadAnswer", "Refused", "TimedOut", "Unreachable"),
-        ),
-        "evaluator.metrics.protocol": ("TTCRange",),
-        "evaluator.metrics.registry": ("Metric",),
-        "evaluator.problems": ("FileWarning",),
-        "evaluator.scoring.results": ("GroupScores",),
-        "evaluator.truth.numbering": ("Numbering",),
-        "evaluator.truth.objects": ("Objects",),
-        "evaluator.units": ("Units",),
+SECTIONS: Final[dict[str, dict[str, dict[str, tuple[str, ...]]]]] = {
+    "python-reference": {
+        "Read and write": {
+            "evaluator": (
+                *("read_predictions", "write_predictions", "convert", "read_truth", "read_manifest"),
+                *("read_numbering", "manifest_frame", "predictions_from_frame"),
+            ),
+        },
+        "Score": {
+            "evaluator": (
+                *("evaluate", "get_protocol", "rounded", "format_rounded"),
+                *("PROTOCOLS", "SCORE_NAMES", "TTC_RANGES"),
+            )
+        },
+        "Compare": {"evaluator": ("compare_predictions", "confidence_intervals", "Difference")},
+        "Scale ratios": {
+            "evaluator": ("scale_ratio_to_ttc", "ttc_to_scale_ratio", "convert_rate", "fps_of_gap"),
+        },
+        "Files and scores": {
+            "evaluator": (
+                *("Predictions", "GroundTruth", "Manifest", "Table", "Report", "RangeScore", "Protocol"),
+                *("Rejected", "Problem", "PROBLEM_CODES"),
+            ),
+            "evaluator.metrics.protocol": ("TTCRange",),
+            "evaluator.metrics.registry": ("Metric",),
+            "evaluator.problems": ("FileWarning",),
+            "evaluator.scoring.results": ("GroupScores",),
+            "evaluator.truth.numbering": ("Numbering",),
+            "evaluator.truth.objects": ("Objects",),
+            "evaluator.units": ("Units",),
+        },
+        "Client of a leaderboard": {
+            "evaluator": ("Client", "ClientError"),
+            "evaluator.client.answers": (
+                *("Account", "Board", "BoardEntry", "Compared", "ConfidenceInterval", "Method", "Pair"),
+                *("Queue", "Quota", "Submission", "VisibilityPreview"),
+                *("BadAnswer", "Refused", "TimedOut", "Unreachable"),
+            ),
+        },
+        "With torch": {
+            "evaluator.torch": ("ScoreMetric",),
+            "evaluator.lightning": ("ScoreCallback",),
+        },
     },
-    "with torch": {
-        "evaluator.torch": ("ScoreMetric",),
-        "evaluator.lightning": ("ScoreCallback",),
-        "tsttc_baselines.torch": ("BoxCrops", "crops_of", "crops_of_clip"),
-    },
-    "starter kit": {
-        "tsttc_baselines.folders": ("read_folder", "read_folder_truth", "SequenceFolder"),
-        "tsttc_baselines.images": ("ImageCache",),
-        "tsttc_baselines.clips": ("Clip",),
-        "tsttc_baselines.estimates": ("Estimator", "Estimate", "Unusable"),
-        "tsttc_baselines.methods": ("get_method", "Method", "Parameter"),
-        "tsttc_baselines.own_methods": ("find_method",),
-        "tsttc_baselines.running": ("run_method", "Run"),
-        "tsttc_baselines.boxes": ("scale_ratio_of_boxes", "expand", "is_usable"),
-        "tsttc_baselines.deep_scale.weights": ("read_weights", "write_weights", "Weights"),
+    "baselines-reference": {
+        "Frames": {
+            "tsttc_baselines.folders": ("read_folder", "read_folder_truth", "SequenceFolder"),
+            "tsttc_baselines.images": ("ImageCache",),
+            "tsttc_baselines.clips": ("Clip",),
+            "tsttc_baselines.boxes": ("scale_ratio_of_boxes", "expand", "is_usable"),
+        },
+        "Methods": {
+            "tsttc_baselines.estimates": ("Estimator", "Estimate", "Unusable"),
+            "tsttc_baselines.methods": ("get_method", "Method", "Parameter"),
+            "tsttc_baselines.own_methods": ("find_method",),
+            "tsttc_baselines.running": ("run_method", "Run"),
+        },
+        "Networks": {
+            "tsttc_baselines.torch": ("BoxCrops", "crops_of", "crops_of_clip"),
+            "tsttc_baselines.deep_scale.weights": ("read_weights", "write_weights", "Weights"),
+        },
     },
 }
-"""By the titles of the page: public names beside those of `evaluator` itself, by their modules."""
+"""By guide and title: public names by the modules from which they are imported."""
 
 _Definition = ast.FunctionDef | ast.ClassDef
 
 
-def text() -> str:
-    """The reference of both packages as Markdown."""
-    homes = sorted(_homes().items(), key=lambda each: each[0].lower())
-    parts = ["## evaluator", "", "Import these names from `evaluator`:", ""]
-    parts += [_index("evaluator", [name for name, _ in homes]), ""]
-    for name, module in homes:
-        parts += _entry(name, module, shown=f"evaluator.{name}")
-    for title, modules in SECTIONS.items():
-        parts += [f"## {title[0].upper()}{title[1:]}", "", "Each name belongs to the module before it:", ""]
-        parts += [", ".join(_index(module, names) for module, names in modules.items()), ""]
+def text(guide: str) -> str:
+    """The reference of a package as Markdown, for its guide."""
+    parts: list[str] = []
+    for title, modules in SECTIONS[guide].items():
+        mark = "- " if len(modules) > 1 else ""
+        parts += [f"## {title}", ""]
+        parts += [f"{mark}From `{module}`: {_links(module, names)}" for module, names in modules.items()]
+        parts += [""]
         for module, names in modules.items():
             for name in names:
-                parts += _entry(name, module, shown=f"{module}.{name}")
+                parts += _entry(name, module)
     return "\n".join(parts)
 
 
-def _index(module: str, names: Sequence[str]) -> str:
+def _types(signature: str, package: str) -> Iterator[str]:
+    """Links to the classes that a signature names; of two with one name to that of the package."""
+    modules = [each for sections in SECTIONS.values() for part in sections.values() for each in part.items()]
+    every = [(name, module) for module, names in modules for name in names]
+    homes = dict(sorted(every, key=lambda each: each[1].startswith(package)))
+    named = dict.fromkeys(name for name in re.findall(r"\b[A-Z][a-z]\w+", signature) if name in homes)
+    if named:
+        yield from (f"Types: {', '.join(_links(homes[name], [name]) for name in named)}.", "")
+
+
+def _links(module: str, names: Iterable[str]) -> str:
     """Links to the names of a module."""
-    return ", ".join(f"[`{name}`](#{slugify(f'{module}.{name}')})" for name in names)
+    page = "baselines-reference.md" if module.startswith("tsttc_baselines") else "python-reference.md"
+    return ", ".join(f"[`{name}`]({page}#{slugify(f'{module}.{name}')})" for name in names)
 
 
+@cache
 def _homes() -> dict[str, str]:
     """The public names of `evaluator`, and the module that defines each."""
     tree = _tree("evaluator")
@@ -95,18 +136,21 @@ def _tree(module: str) -> ast.Module:
     return ast.parse(source.read_text(encoding="utf-8"))
 
 
-def _entry(name: str, module: str, *, shown: str) -> Iterator[str]:
-    """A heading, the signature and the docstring of a name; of a class its public members as well.
+def _entry(name: str, module: str) -> Iterator[str]:
+    """A heading, the docstring and the arguments of a name; of a class its public members as well.
 
     Raises `KeyError` for a name that the module does not define.
     """
-    body = _tree(module).body
-    yield f"### {shown}"
+    home = _homes()[name] if module == "evaluator" else module
+    body = _tree(home).body
+    yield f"### {module}.{name}"
     yield ""
     for number, node in enumerate(body):
         if isinstance(node, _Definition) and node.name == name:
-            yield from _code(_signature(node, shown))
+            signature = _signature(node)
+            yield from _code(signature)
             yield from _words(ast.get_docstring(node))
+            yield from _types(signature.partition("(")[2], module.partition(".")[0])
             if isinstance(node, ast.ClassDef):
                 yield from _members(node)
             return
@@ -114,7 +158,7 @@ def _entry(name: str, module: str, *, shown: str) -> Iterator[str]:
             following = body[number + 1] if number + 1 < len(body) else None
             yield from _words(_string(following))
             return
-    raise KeyError(f"{module} does not define {name}")
+    raise KeyError(f"{home} does not define {name}")
 
 
 def _members(node: ast.ClassDef) -> Iterator[str]:
@@ -126,14 +170,15 @@ def _members(node: ast.ClassDef) -> Iterator[str]:
         marks = {ast.unparse(mark).rpartition(".")[2] for mark in each.decorator_list}
         call = each.name if marks & {"property", "cached_property"} else f"{each.name}{_call(each)}"
         about = (ast.get_docstring(each) or "").partition("\n\n")[0].replace("\n", " ")
+        end = ": " if call == each.name else "\\\n  "  # a call has its own line
         # An arrow of two signs would break between them on a phone.
-        lines.append(f"- `{call.replace(' -> ', ' → ')}`: {about}")
+        lines.append(f"- `{call.replace(' -> ', ' → ')}`{end}{about}")
     yield from lines
     if lines:
         yield ""
 
 
-def _signature(node: _Definition, shown: str) -> str:
+def _signature(node: _Definition) -> str:
     """How it is called: a function's arguments and result, or the fields of a dataclass."""
     if isinstance(node, ast.ClassDef):
         made = next((e for e in node.body if isinstance(e, ast.FunctionDef) and e.name == "__init__"), None)
@@ -145,8 +190,8 @@ def _signature(node: _Definition, shown: str) -> str:
         is_keyword_only = any("kw_only=True" in ast.unparse(mark) for mark in node.decorator_list)
         parts = _arguments(made) if made else [*(["*"] if is_keyword_only else []), *fields]
         is_abstract = any(ast.unparse(base) in {"Protocol", "Exception"} for base in node.bases)
-        return shown if is_abstract else _wrapped(shown, parts, "")
-    return _wrapped(shown, _arguments(node), _result(node))
+        return "" if is_abstract else _wrapped(node.name, parts, "")
+    return _wrapped(node.name, _arguments(node), _result(node))
 
 
 def _call(node: ast.FunctionDef) -> str:
@@ -178,7 +223,8 @@ def _wrapped(shown: str, parts: list[str], result: str) -> str:
 
 
 def _code(signature: str) -> Iterator[str]:
-    yield from ("```text", signature, "```", "")
+    if signature:
+        yield from ("```text", signature, "```", "")
 
 
 def _words(docstring: str | None) -> Iterator[str]:

@@ -7,14 +7,14 @@ from django.urls import reverse
 from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
 
-from leaderboard.web.docs import guides
+from leaderboard.web.docs import guides, python_reference
 
 MAX_QUERY: Final = 100
 MAX_HITS: Final = 12
 _MAX_COUNT: Final = 8
 _SNIPPET: Final = 200
 # Pages of names, where a word is often a name: what explains it comes first.
-_REFERENCES: Final = frozenset({"cli", "python-reference"})
+_REFERENCES: Final = frozenset({"cli", *python_reference.SECTIONS})
 _WORD: Final = re.compile(r"[^\W_]+")
 # A longer word also finds what begins with it: "quot" finds "quota", but "to" does not find "token".
 _MAX_SHORT: Final = 3

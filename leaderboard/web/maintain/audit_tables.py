@@ -9,12 +9,15 @@ from typing import Any, Final, NamedTuple
 from django.core.exceptions import ValidationError
 from django.db.models import Model
 from django.urls import reverse
+from django.utils.dateparse import parse_duration
 
 from leaderboard import audit
 from leaderboard.methods.details import DETAILS
 from leaderboard.models import AuditEvent, Edition, Evaluation, Method, Split, Submission, Team, User
 from leaderboard.pages.texts import PAGES
+from leaderboard.quotas.spans import span
 from leaderboard.submissions.status_text import short_fault
+from leaderboard.web.maintain.quota_forms import QuotaRulesForm
 
 MAX_LISTED: Final = 5
 _DIGEST: Final = re.compile(r"(sha256:[0-9a-f]{8})[0-9a-f]{56}")
@@ -22,10 +25,14 @@ _MOMENT: Final = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d):\d\d(?:\.\d+)?\+0
 # In `before → after`, as a change of a split is kept.
 _PYTHON: Final = re.compile(r"(?<=→ )(?:None|True|False)$|^(?:None|True|False)(?= →)")
 _WORDS: Final = {"None": "none", "True": "yes", "False": "no"}
-_FIELDS: Final = {each.name: each.label.lower() for each in DETAILS} | {
-    "paper_url": "paper link",
-    "code_url": "code link",
-}
+_SPAN: Final = re.compile(r"(?:(?<=→ )|^)(?:\d+ days?, )?\d+:\d\d:\d\d(?= →|$)")
+_FIELDS: Final = (
+    {each.name: each.label.lower() for each in DETAILS}
+    | {name: str(field.label).lower() for name, field in QuotaRulesForm.base_fields.items()}
+    | {"paper_url": "paper link", "code_url": "code link"}
+)
+# Details that name a row by its id.
+_KEYS: Final = {"user": "User", "team": "Team", "from": "Team", "to": "Team", "split": "Split"}
 _VERBS: Final = {
     "shown": "visibility changed",
     "revealed": "made public on its day",
@@ -97,18 +104,14 @@ def named(event: AuditEvent, names: Mapping[str, str]) -> dict[str, str]:
 def _details(
     event: AuditEvent, names: Mapping[str, str], subjects: Mapping[tuple[str, str], Subject]
 ) -> list[tuple[str, str]]:
-    # A first attempt is the rule, and a digest is for programs: the JSON has both.
-    shown = {
-        name: value
-        for name, value in event.details.items()
-        if name != "report_digest" and (name, value) != ("attempt", 1)
-    }
-    texts = {name: _words(value) for name, value in shown.items()}
+    # A first attempt is the rule, a digest is for programs, and the object is an edition: the JSON has all.
+    hidden = {"report_digest", "edition" if event.noun == "Edition" else ""}
+    shown = {name: value for name, value in event.details.items() if name not in hidden}
+    texts = {name: _words(value) for name, value in shown.items() if (name, value) != ("attempt", 1)}
     texts |= {
-        name: subjects[noun, text].name
-        for name, text in texts.items()
-        for noun in ("Team", "User")
-        if name in {"user", "team", "from", "to"} and (noun, text) in subjects
+        name: subjects[noun, texts[name]].name
+        for name, noun in _KEYS.items()
+        if name in texts and (noun, texts[name]) in subjects
     }
     texts |= {name: text or "(blanked)" for name, text in named(event, names).items()}
     if texts.get("from") and texts.get("to"):
@@ -117,7 +120,12 @@ def _details(
     if event.verb != "rejected":
         facts.pop("reason", None)
     texts = facts | texts
-    return [(name.removeprefix("is_").replace("_", " "), text) for name, text in texts.items() if text]
+    texts["reason"] = texts.pop("reason", "")  # A sentence: it comes last.
+    return [(_label(name), text) for name, text in texts.items() if text]
+
+
+def _label(name: str) -> str:
+    return _FIELDS.get(name, name.removeprefix("is_").replace("_", " "))
 
 
 def _words(value: Any) -> str:
@@ -126,13 +134,11 @@ def _words(value: Any) -> str:
     if isinstance(value, list):
         n_more = len(value) - MAX_LISTED
         more = f" and {n_more:,} more" if n_more > 0 else ""
-        return (
-            ", ".join(_FIELDS.get(str(each), str(each).replace("_", " ")) for each in value[:MAX_LISTED])
-            + more
-        )
+        return ", ".join(_label(str(each)) for each in value[:MAX_LISTED]) + more
     text = "" if value is None else _PYTHON.sub(lambda match: _WORDS[match[0]], str(value))
     if text.isupper():  # a choice, as PRIVATE
         return text.lower()
+    text = _SPAN.sub(lambda match: span(time) if (time := parse_duration(match[0])) else "none", text)
     return _MOMENT.sub(r"\1 \2 UTC", _DIGEST.sub(r"\1…", text))
 
 
@@ -143,10 +149,8 @@ def _subjects(events: Iterable[AuditEvent]) -> dict[tuple[str, str], Subject]:
     ids: dict[str, set[str]] = defaultdict(set)
     for event in events:
         ids[event.noun].add(event.noun_id)
-        # Details name people and teams by their id as well.
-        for name in ("user", "team", "from", "to"):
-            if name in event.details:
-                ids["User" if name == "user" else "Team"].add(str(event.details[name]))
+        for name in _KEYS.keys() & event.details:
+            ids[_KEYS[name]].add(str(event.details[name]))
     subjects: dict[tuple[str, str], Subject] = {}
     for noun, (model, related, subject_of) in _TABLES.items():
         keys = [key for key in ids[noun] if _is_key(model, key)]

@@ -24,11 +24,10 @@ def _protocol_words(protocol: Protocol) -> str:
     """Tell protocols apart.
 
     >>> _protocol_words(PROTOCOLS["tsttc-2"]), _protocol_words(PROTOCOLS["toolkit"])
-    ('MiD, RTE, WE; truncates predictions near 0', 'MiD, RTE; rejects predictions that have no MiD')
+    ('MiD, RTE, WE; truncates predictions near 0', 'MiD, RTE; rejects files in which a prediction has no MiD')
     """
-    near_zero = (
-        "truncates predictions near 0" if protocol.near_zero_s else "rejects predictions that have no MiD"
-    )
+    rejects = "rejects files in which a prediction has no MiD"
+    near_zero = "truncates predictions near 0" if protocol.near_zero_s else rejects
     return f"{', '.join(metric.symbol for metric in protocol.metrics)}; {near_zero}"
 
 
@@ -58,7 +57,7 @@ class OpenForm(SiteForm):
 
 class ReasonForm(SiteForm):
     reason = reason_field(
-        "One or two sentences. The public changelog and the notice to the teams show them.",
+        "Required: one or two sentences. The public changelog and the notice to the teams show them.",
         at="public changelog",
     )
 
@@ -78,4 +77,4 @@ class PublishForm(RollBackForm):
 
 
 class DiscardForm(ReasonForm):
-    reason = reason_field("One sentence for the audit log.")
+    reason = reason_field("Required: one sentence for the audit log.")

@@ -1,6 +1,6 @@
 """Moderation for maintainers: a team with its people, methods and entries; each action has a page."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 from uuid import UUID
@@ -8,7 +8,7 @@ from uuid import UUID
 from django import forms
 from django.contrib import messages
 from django.core.exceptions import ValidationError
-from django.db.models import F, Q
+from django.db.models import Prefetch, Q, QuerySet
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
@@ -20,6 +20,7 @@ from leaderboard.moderation import forgetting, hiding
 from leaderboard.moderation.hiding import MAX_REASON
 from leaderboard.people import teams, tokens
 from leaderboard.people.names import MAX_NAME
+from leaderboard.submissions import outcomes
 from leaderboard.web.forms import SiteForm, confirmation
 from leaderboard.web.maintain.maintainer_forms import reason_field
 from leaderboard.web.maintain.maintainer_views import (
@@ -81,8 +82,8 @@ class MoveForm(ActionForm):
 
 MAX_ENTRIES: Final = 200
 _RENAMED: Final = (
-    "The new name replaces the old one on all boards, also as of earlier dates, in exports, feeds, pictures "
-    "and search."
+    "The new name replaces the old one on all boards, including those of earlier dates, in exports, feeds, "
+    "pictures and search."
 )
 
 
@@ -152,7 +153,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
     "withdraw": Action(
         Submission,
         "Withdraw the submission",
-        "Its scores leave the board; its row stays, marked with the date. This cannot be undone.",
+        "Its scores are removed from the board; its row stays, marked with the date. This cannot be undone.",
         "Withdraw",
         FinalActionForm,
         lambda subject, **arguments: hiding.withdraw_entry(submission=subject, is_hidden=False, **arguments),
@@ -160,8 +161,8 @@ ACTIONS: Final[Mapping[str, Action]] = {
     "hide": Action(
         Submission,
         "Hide the submission",
-        "It leaves all boards, also those as of earlier dates. Its team still sees it as withdrawn. "
-        "This cannot be undone.",
+        "It is removed from all boards, including those of earlier dates. Its team still sees it as "
+        "withdrawn. This cannot be undone.",
         "Hide",
         FinalActionForm,
         lambda subject, **arguments: hiding.withdraw_entry(submission=subject, is_hidden=True, **arguments),
@@ -225,12 +226,14 @@ def team(request: HttpRequest, team_id: UUID) -> HttpResponse:
     return render(request, "maintain/team.html", context)
 
 
-def _with_states(sent: Iterable[Submission]) -> list[Submission]:
-    rows = list(sent)
-    decided = Evaluation.objects.filter(submission__in=rows, edition=F("submission__split__current_edition"))
-    evaluations = {row.submission_id: row for row in decided}
+def _with_states(sent: QuerySet[Submission]) -> list[Submission]:
+    rows = list(
+        sent.prefetch_related(Prefetch("evaluations", Evaluation.objects.defer("report", "problems")))
+    )
     for row in rows:
-        row.evaluation = evaluations.get(row.pk)  # type: ignore[attr-defined]  # for the template
+        by_edition: dict[int | None, Evaluation] = {each.edition_id: each for each in row.evaluations.all()}
+        row.evaluation = by_edition.get(row.split.current_edition_id)  # type: ignore[attr-defined]  # for the template
+        row.can_be_withdrawn = outcomes.can_be_withdrawn(row)  # type: ignore[attr-defined]  # likewise
     return rows
 
 

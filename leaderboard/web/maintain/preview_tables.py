@@ -27,6 +27,7 @@ def change_table(preview: Preview) -> dict[str, Any]:
         "headings": [(score_heading(name, primary=primary), _note(name, preview)) for name in names],
         "rows": [_change_row(change, names, preview) for change in preview.entries],
         "has_states": any({e.old_status, e.new_status} != {Status.SCORED} for e in preview.entries),
+        "has_unranked": any(None in (e.old_rank, e.new_rank) for e in preview.entries),
         "n_rejected_in_both": len(preview.changes) - len(preview.entries),
         "effects": effects(preview),
     }
@@ -148,8 +149,8 @@ def _shown_names(preview: Preview) -> tuple[str, ...]:
 def _note(name: str, preview: Preview) -> str:
     """Say of a column that only one of both protocols has it."""
     if name not in preview.edition.rules.score_names:
-        return f"not in {preview.edition.protocol}"
-    return "" if name in preview.published.rules.score_names else f"new in {preview.edition.protocol}"
+        return "removed"
+    return "" if name in preview.published.rules.score_names else "new"
 
 
 def _change_row(change: Change, names: Sequence[str], preview: Preview) -> dict[str, Any]:

@@ -51,12 +51,12 @@ def _count_field(name: str, label: str, help_text: str) -> forms.IntegerField:
 class QuotaRulesForm(SiteForm):
     quota_limit = _count_field(
         "quota_limit",
-        "Submissions of a team",
-        "The most in the time window. Empty: no limit; 0: none allowed.",
+        "Submissions per team",
+        "Maximum per time window. Empty: no limit; 0: none allowed.",
     )
     quota_window = SpanField(
         label="Time window",
-        help_text="The time in which they count, for example 30 days or 24 hours.",
+        help_text="The period over which submissions are counted, for example 30 days or 24 hours.",
         error_messages={"required": "No window was given; expected one like 30 days or 24 hours."},
     )
     quota_min_gap = SpanField(
@@ -67,7 +67,7 @@ class QuotaRulesForm(SiteForm):
     quota_rejected_limit = _count_field(
         "quota_rejected_limit",
         "Rejected or cancelled files",
-        "Of a team in 24 hours. Empty: no limit.",
+        "Per team in 24 hours. Empty: no limit.",
     )
 
 

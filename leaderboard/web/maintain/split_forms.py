@@ -6,6 +6,7 @@ from datetime import datetime
 from typing import Any, Final, NamedTuple
 
 from django import forms
+from django.utils.html import format_html
 
 from leaderboard.editions import deadlines
 from leaderboard.editions.policy import MAX_DESCRIPTION, MAX_POSITION, NAMES, POSITION_FAULT, Policy
@@ -16,7 +17,7 @@ from leaderboard.quotas.spans import span
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.quota_forms import QuotaRulesForm
 
-_ZONE: Final = "Add the time zone: UTC, AoE, Europe/Berlin or +01:00."
+_ZONE: Final = "Add the time zone: UTC, AoE or +01:00."
 _KEEP_SMALL: Final = (
     "Every extra split on the same hidden ground truth gives teams more tries at the same hidden values. "
     "Keep the quota small."
@@ -32,9 +33,7 @@ class Section(NamedTuple):
     note: str = ""
 
 
-_DATES: Final = Section(
-    "Dates", (), ("opens_at", "closes_at"), f"{_ZONE[:-1]}; also where an announcement ends."
-)
+_DATES: Final = Section("Dates", (), ("opens_at", "closes_at"), _ZONE)
 _ANNOUNCEMENT: Final = Section("Announcement", ("announcement", "announcement_ends_at"))
 _QUOTA_FIELDS: Final = ("quota_limit", "quota_window", "quota_min_gap", "quota_rejected_limit")
 _ADMISSION: Final = Section("Admission", ("needs_admission", "how_to_be_admitted"))
@@ -92,14 +91,18 @@ class PolicyForm(QuotaRulesForm):
         max_length=300,
         help_text="One line of plain text on the pages of the split and in the API. Empty: no announcement.",
     )
-    announcement_ends_at = MomentField("Announcement ends", "Required if there is a text.")
+    announcement_ends_at = MomentField("Announcement ends", f"Required if there is an announcement. {_ZONE}")
     decimals = forms.TypedChoiceField(
         choices=[(1, "one"), (2, "two")],
         coerce=int,
-        help_text="Of the scores, from the next edition on. More decimals reveal more about a hidden "
-        "ground truth.",
+        help_text="Decimal places of the scores, starting with the next edition. More decimals reveal more "
+        "about a hidden ground truth.",
     )
-    needs_admission = forms.BooleanField(label="Only admitted teams can submit", required=False)
+    needs_admission = forms.BooleanField(
+        label="Only admitted teams can submit",
+        required=False,
+        help_text="Admit each team under Teams, Quotas.",
+    )
     how_to_be_admitted = forms.CharField(
         label="How to request access",
         required=False,
@@ -157,16 +160,19 @@ class NewSplitForm(PolicyForm):
         label="Ground truth",
         widget=forms.RadioSelect,
         initial="hidden",
-        help_text="With a new ground truth, the split starts switched off: import the ground truth with the "
-        "command import_truth, then list the split. With that of another split, its board exists at once.",
+        help_text=format_html(
+            "New: leave the split switched off, import the ground truth with <code>{}</code>, then list the "
+            "split. Same as another split: you can list the split at once.",
+            "import_truth",
+        ),
         error_messages={"required": "No ground truth was chosen; expected one of those listed."},
     )
 
     field_order = ("name", "title", "truth")
     is_hidden = True
     layout = (
-        (Section("Required", field_order), Section("Display", ("description",), _DISPLAY_FIELDS), _DATES),
-        (_ANNOUNCEMENT, Section("Quota", (), _QUOTA_FIELDS), _ADMISSION),
+        (Section("Required", field_order), Section("Display", ("description",), _DISPLAY_FIELDS)),
+        (_DATES, _ANNOUNCEMENT, Section("Quota", (), _QUOTA_FIELDS), _ADMISSION),
     )
 
     def __init__(self, data: Any = None, *, initial: Any = None) -> None:
@@ -175,7 +181,7 @@ class NewSplitForm(PolicyForm):
         self.fields["truth"].choices = [  # type: ignore[attr-defined]  # a ChoiceField
             ("hidden", "New, hidden"),
             ("open", "New, open"),
-            *((f"as {split.pk}", f"That of {split.title} (a challenge)") for split in able),
+            *((f"as {split.pk}", f"Same as {split.title} (a challenge)") for split in able),
         ]
 
     def wanted(self) -> dict[str, Any]:

@@ -96,8 +96,8 @@ class MailForm(SiteForm):
     )
     text = forms.CharField(
         max_length=announcements.MAX_TEXT,
-        help_text="Plain text, at most 5,000 characters. The name of the site and a link to stop such mails "
-        "are added at the end.",
+        help_text="Plain text, at most 5,000 characters. The name of the site and an unsubscribe link are "
+        "added at the end.",
         error_messages={"required": "No text was given; expected a few sentences."},
         widget=forms.Textarea(attrs={"rows": 10}),
     )
@@ -139,7 +139,7 @@ def _sent(request: HttpRequest, announcement: Announcement) -> HttpResponse:
     # After a second click nobody is left to get it.
     n_people = announcements.announce(announcement, now=timezone.now(), actor=maintainer_of(request))
     if n_people:
-        messages.success(request, f"The mail to {counted(n_people, 'person', 'people')} is queued.")
+        messages.success(request, f"The email to {counted(n_people, 'person', 'people')} is queued.")
     else:
-        messages.info(request, "Nothing was sent: everybody who gets this mail has got it already.")
+        messages.info(request, "Nothing was sent: everybody who gets this email has got it already.")
     return redirect("maintain_splits")

@@ -38,7 +38,7 @@ class MethodForm(DetailsForm):
     @classmethod
     def of_method(cls, request: HttpRequest, *, method: Method) -> "MethodForm":
         form = cls.asked(request, initial=_stated(method))
-        form.fields["description"].widget.attrs["rows"] = 5
+        form.fields["description"].widget.attrs["rows"] = 12
         return form
 
     def changes(self) -> dict[str, object]:
@@ -79,7 +79,7 @@ class ShowForm(SiteForm):
         label="Becomes public on",
         required=False,
         error_messages={"invalid": "Enter a date such as 2027-03-01."},
-        help_text="Optional, at 00:00 UTC. Without a day, it stays anonymous until you change it.",
+        help_text="Optional, at 00:00 UTC. If left empty, it stays anonymous until you change it.",
         widget=forms.DateInput(attrs={"type": "date"}),
     )
     needs_day = False
@@ -104,7 +104,7 @@ class ShowForm(SiteForm):
             form = cls(initial={"visibility": marked, "reveal_on": _day(method.reveal_at)})
         form.needs_day = method.visibility == Visibility.ANONYMOUS and method.reveal_at is None
         if form.needs_day:
-            form.fields["reveal_on"].help_text = "At 00:00 UTC of this day."
+            form.fields["reveal_on"].help_text = "At 00:00 UTC on that day."
         return form
 
     def clean(self) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from leaderboard.web.boards.score_columns import (
 )
 from leaderboard.web.boards.tables import rank_range
 from leaderboard.web.formatting import grouped
-from leaderboard.web.methods.score_cards import gap_of, gap_to_best, score_card
+from leaderboard.web.methods.score_cards import Gap, gap_of, gap_to_best, score_card
 
 _MAX_REASON: Final = 110
 
@@ -88,7 +88,7 @@ def method_result(result: Result, pairs: Sequence[Pair]) -> dict[str, Any]:
         "result": result,
         "table": edition_table(entry, result.edition),
         "card": score_card(entry, result.rows, n_ranked=result.n_ranked, gap=gap),
-        "gaps": gaps,
+        "nearby": _nearby(entry, gaps),
         "is_tested": any(not each.why_not_tested for each in gaps),
         "why_not_tested": dict.fromkeys(each.why_not_tested for each in gaps if each.why_not_tested),
         "history": whiskers.sparkline(values) if len(values) > 1 and is_ordered else "",
@@ -107,6 +107,12 @@ def method_result(result: Result, pairs: Sequence[Pair]) -> dict[str, Any]:
         "compare_href": _compare_href(result),
         "can_compare": entry.value is not None,
     }
+
+
+def _nearby(entry: Entry, gaps: Sequence[Gap]) -> list[Gap | None]:
+    """Return the rows of nearby ranks: None is the entry itself, in its place."""
+    n_better = sum((gap.other.rank or 0) < (entry.rank or 0) for gap in gaps)
+    return [*gaps[:n_better], None, *gaps[n_better:]] if gaps else []
 
 
 def _compare_href(result: Result) -> str:

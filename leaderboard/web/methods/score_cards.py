@@ -8,7 +8,6 @@ from django.utils.safestring import SafeString
 from evaluator.metrics.protocol import metric_of
 from evaluator.metrics.registry import Metric
 from evaluator.scoring.results import format_rounded
-from evaluator.tables.sentences import p_cell
 from leaderboard.boards.rows import Entry
 from leaderboard.statistics.comparisons import Pair
 from leaderboard.web.boards import whiskers
@@ -29,7 +28,6 @@ class Gap(NamedTuple):
     interval: str
     size: str
     size_interval: str
-    p: str
     is_significant: bool
     why_not_tested: str
     is_waiting: bool
@@ -52,7 +50,8 @@ def score_card(entry: Entry, rows: Sequence[Entry], *, n_ranked: int, gap: Gap |
     """Make the card of an entry among `rows`, which everybody sees; None without a value."""
     if entry.value is None:
         return None
-    others = [row for row in rows if row.method_id != entry.method_id]
+    # An entry without a rank is not the best of its method: the board's row of that method is another one.
+    others = [row for row in rows if entry.rank is None or row.method_id != entry.method_id]
     values = [row.value for row in others if row.value is not None]
     metric = metric_of(entry.primary)
     n_better = sum(value < entry.value for value in values)
@@ -94,7 +93,6 @@ def gap_of(pair: Pair) -> Gap:
         interval=" to ".join(signed(end, decimals=decimals) for end in ends),
         size=sizes[0],
         size_interval=" to ".join(sizes[1:]),
-        p=p_cell(difference.p, difference.p_below) if difference else "",
         is_significant=bool(difference and difference.is_significant),
         why_not_tested=pair.withheld,
         is_waiting=difference is None,

@@ -51,9 +51,8 @@ def outcome_table(
         second=board_position.second if board_position else frozenset(),
     )
     rows = board_position.rows if board_position else ()
-    card = score_card(
-        entry, rows, n_ranked=board_position.n_ranked if board_position else 0, gap=gap_to_best(entry, rows)
-    )
+    n_ranked = board_position.n_ranked if board_position else 0
+    card = score_card(entry, rows, n_ranked=n_ranked, gap=gap_to_best(entry, rows))
     # A private method has no rank that others could look up.
     quoted = replace(entry, rank=None) if board_position and board_position.is_supposed else entry
     if entry.pseudonym:

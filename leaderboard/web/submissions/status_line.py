@@ -5,8 +5,6 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Final, NamedTuple
 
-from django.utils.text import get_text_list
-
 from leaderboard.models import Evaluation, Status
 from leaderboard.submissions.progress import Progress
 from leaderboard.submissions.status_text import short_fault
@@ -127,13 +125,13 @@ def truncation(truncated: Mapping[str, int]) -> str:
     """Say how many predictions were truncated at each boundary.
 
     >>> truncation({"-20": 0, "0.05": 1, "20": 1200})
-    '1,201 predictions lay outside the allowed range and were truncated: 1 to 0.05 s and 1,200 to 20 s.'
+    '1,201 predictions were outside the allowed range and were truncated: 1 at 0.05 s, 1,200 at 20 s.'
     """
     moved = {boundary: n for boundary, n in truncated.items() if n}
     n_moved = sum(moved.values())
     if not moved:
         return "Nothing was truncated."
-    parts = [f"{grouped(n)} to {boundary.replace('-', '−')} s" for boundary, n in moved.items()]
+    parts = [f"{grouped(n)} at {boundary.replace('-', '−')} s" for boundary, n in moved.items()]
     subject = "1 prediction" if n_moved == 1 else f"{grouped(n_moved)} predictions"
     verb = "was" if n_moved == 1 else "were"
-    return f"{subject} lay outside the allowed range and {verb} truncated: {get_text_list(parts, 'and')}."
+    return f"{subject} {verb} outside the allowed range and {verb} truncated: {', '.join(parts)}."

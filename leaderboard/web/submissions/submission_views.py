@@ -134,11 +134,13 @@ def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
             done = "withdrawn" if before.is_final else "cancelled"
             messages.success(request, f"The submission is {done}.")
         return redirect("submission", row.pk)
+    position = outcomes.board_position_of(row, before)
     others = Submission.objects.active().filter(method=row.method_id, split=row.split_id).exclude(pk=row.pk)
     context = {
         "submission": row,
         "is_waiting": not before.is_final,
         "is_failed": before.fault_is_ours,
+        "is_best": position is not None and position.rank is not None,
         "is_only": not others.filter(evaluations__status=Status.SCORED).exists(),
     }
     status = 422 if form.errors else 200

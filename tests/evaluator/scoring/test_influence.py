@@ -83,7 +83,9 @@ def test_two_files_are_compared_with_what_their_difference_rests_on() -> None:
     turned = compare_predictions(far, near, truth)["mid"]
     assert turned.influence == known
     assert differences["mid"].turned().influence == known
-    assert "recordings on which near leads most" in sentences.influence(
+    assert "recordings that most favour near are left out" in sentences.influence(
         "near", "far", difference=differences["mid"]
     )
-    assert "recordings on which near leads most" in sentences.influence("far", "near", difference=turned)
+    assert "recordings that most favour near are left out" in sentences.influence(
+        "far", "near", difference=turned
+    )

@@ -15,7 +15,7 @@ from tests.validity.coverage import Coverage
 
 pytestmark = pytest.mark.slow
 
-# Cells in which no interval of this kind holds 95%: docs/uncertainty.md gives their coverage.
+# Cells in which no interval of this kind holds 95%: docs/validation.md gives their coverage.
 SKEWED = {"Pareto", "unequal"}
 
 

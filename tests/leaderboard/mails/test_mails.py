@@ -189,9 +189,9 @@ def test_tokens_that_end_and_splits_that_close_bring_mails_to_those_concerned(
 def test_a_maintainer_previews_an_announcement_and_sends_it_once(
     edition: Edition, owner: User, keeper: Client
 ) -> None:
-    assert "Nobody would get this mail now." in keeper.get("/maintain/splits/test/mail/").text
+    assert "Nobody would get this email now." in keeper.get("/maintain/splits/test/mail/").text
     builders.submit(owner, builders.predictions(edition))
-    assert "This mail goes to 1 person:" in keeper.get("/maintain/splits/test/mail/").text
+    assert ">1 person</a>: those whose team" in keeper.get("/maintain/splits/test/mail/").text
     address, draft = "/maintain/splits/test/mail/", {"subject": "Moved", "text": "First.\r\n\r\nSecond <b>."}
     assert keeper.post(address, {"subject": "", "text": " "}).status_code == 422
     assert keeper.post(address, draft | {"subject": "x" * 151}).status_code == 422
@@ -202,13 +202,13 @@ def test_a_maintainer_previews_an_announcement_and_sends_it_once(
     assert owner.email not in page
     assert "First." in keeper.post(address, draft | {"step": "write"}).content.decode()
     assert not Mail.objects.exists()
-    for words in ("The mail to 1 person is queued.", "Nothing was sent"):  # a double click
+    for words in ("The email to 1 person is queued.", "Nothing was sent"):  # a double click
         assert words in keeper.post(address, draft | {"step": "send"}, follow=True).content.decode()
     assert queue_due_mails() == [(owner.email, "announcement")]
     assert Mail.objects.get().text.startswith("First.\n\nSecond <b>.\n\n--\n")
     event = AuditEvent.objects.get(verb="announced")
     assert event.details == {"subject": "Moved", "n_people": 1}
-    assert "Nobody gets this mail" in keeper.post(address, draft | {"step": "preview"}).content.decode()
+    assert "Nobody gets this email" in keeper.post(address, draft | {"step": "preview"}).content.decode()
     with pytest.raises(NotMaintainer):
         announcements.announce(
             announcements.cleaned(split=edition.split, subject="S", text="T"), now=timezone.now(), actor=owner

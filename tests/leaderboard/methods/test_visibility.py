@@ -218,7 +218,7 @@ def test_page_shows_what_others_will_see_asks_and_shows_it(
     outcome = pages.page(client.get(f"/submissions/{sent.pk}/")).one("div", id="outcome")
     (link,) = [a for a in outcome.all("a") if a.text == "Publish…"]
     address = link.attributes["href"]
-    assert "I know that this cannot be undone" not in pages.page(client.get(address)).one("main").text
+    assert "I understand that this cannot be undone" not in pages.page(client.get(address)).one("main").text
     main = pages.page(client.get(address, {"visibility": "PUBLIC"})).one("main").text
     for words in (
         "Secret sauce",

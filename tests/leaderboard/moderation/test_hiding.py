@@ -129,6 +129,18 @@ def test_a_hidden_entry_leaves_boards_of_all_times_and_a_withdrawn_one_its_value
     }
 
 
+def test_a_withdrawal_is_offered_where_there_are_scores_to_remove(
+    keeper: Client, edition: Edition, owner: User
+) -> None:
+    scored = builders.submit(owner, builders.predictions(edition), method="Kept")
+    rejected = builders.submit(owner, b"{}", method="Broken")
+    builders.score_all()
+    links = [a.attributes["href"] for a in get(keeper, f"/maintain/teams/{scored.method.team_id}/").all("a")]
+    assert f"/maintain/actions/withdraw/{scored.pk}/" in links
+    assert f"/maintain/actions/withdraw/{rejected.pk}/" not in links
+    assert f"/maintain/actions/hide/{rejected.pk}/" in links
+
+
 def test_a_method_moves_to_another_team_with_its_submissions(
     keeper: Client, edition: Edition, owner: User, stranger: User
 ) -> None:

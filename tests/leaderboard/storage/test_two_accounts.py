@@ -72,7 +72,7 @@ def host(settings: Any) -> Iterator[Host]:
     root.chmod(0o755)
     page = (REPOSITORY / "docs/operations.md").read_text()
     lines = re.findall(r"^install -d -o (\S+) -g (\S+) -m (\d+) (.*)$", page, re.MULTILINE)
-    assert len(lines) == 3
+    assert len(lines) == 4
     for owner, group, mode, paths in lines:
         for path in paths.split():
             folder = root / path.lstrip("/")

@@ -44,7 +44,7 @@ def test_values_have_intervals_ranks_have_ranges_and_what_is_with_the_best_is_ma
     assert cell.attributes["title"] == f"95% confidence interval: {low:.1f} to {high:.1f}"
     assert all("title" in each.attributes for each in row.all("td", class_="wide"))
     for cell in root.one("table", class_="board").all("td", class_="with-best"):
-        assert ", statistically tied for best in its column (95% confidence)" in cell.text
+        assert ", may be the best of its column (95% confidence)" in cell.text
     legend = root.one("details", class_="legend").text
     assert re.search(r"the bar its 95% confidence interval \(bootstrap over [\d,]+ recordings\)", legend)
     assert "Rings are values quoted from papers. They have no confidence interval" in legend
@@ -90,8 +90,16 @@ def test_one_error_alone_has_a_whisker_in_every_column(client: Client, inferred:
     assert [a.text for a in root.one("nav", class_="columns").all("a") if "aria-current" in a.attributes] == [
         "RTE"
     ]
-    hrefs = {a.attributes["href"] for a in root.one("table", class_="board").one("thead").all("a")}
+    heads = root.one("table", class_="board").one("thead")
+    hrefs = {a.attributes["href"] for a in heads.all("a")}
     assert all("columns=rte" in href for href in hrefs)
+    assert len({axis.text for axis in heads.all("svg", class_="axis")}) == 1, "one scale for all"
+
+
+def test_heads_name_an_interval_only_where_one_is_drawn(client: Client, inferred: list[Submission]) -> None:
+    both, one = (get(client, f"/board/test/{query}") for query in ("", f"?q={inferred[0].method.name}"))
+    assert "95% CI" in both.one("table", class_="board").one("thead").text
+    assert "95% CI" not in one.one("table", class_="board").one("thead").text
 
 
 def test_filters_and_search_show_what_fits_and_keep_the_ranks(
@@ -121,6 +129,7 @@ def test_filters_that_nothing_fits_leave_a_sentence_and_a_way_back(
     assert f"0 of {2 + 5} results" in root.one("main").text
     (back,) = [a for a in root.all("a") if a.text == f"Show all {2 + 5} results"]
     assert back.attributes["href"] == "?sort=rte"
+    assert root.all("nav", class_="columns") + root.all("details", class_="exports") == [], "nothing to show"
 
 
 @pytest.mark.parametrize(

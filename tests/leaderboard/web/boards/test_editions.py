@@ -92,7 +92,7 @@ def test_board_as_it_stood_at_a_time(client: Client, entries: list[Submission]) 
     yesterday = sent_at - timedelta(days=1)
     root = get(client, f"/board/test/?at={yesterday:%Y-%m-%d}")
     assert len(pages.board_rows(root)) == 5
-    assert "The board as of" in root.one("main").text
+    assert "This is the board as of" in root.one("main").text
     assert len(pages.board_rows(get(client, f"/board/test/?at={timezone.now():%Y-%m-%d}"))) == 9
 
 
@@ -112,11 +112,12 @@ def test_past_board_lists_what_has_changed_since(
     Publication.objects.update(at=now - timedelta(days=9))
     Evaluation.objects.update(finished_at=now - timedelta(days=8))
     Method.objects.update(shown_at=now - timedelta(days=8))
-    builders.submit(
-        owner, builders.predictions(entries[0].evaluations.get().edition, factor=1.01), method="New"
-    )
+    file = builders.predictions(entries[0].evaluations.get().edition, factor=1.01)
+    builders.submit(owner, file, method="New")
+    passing = builders.submit(owner, file, method="Passing")
     builders.score_all()
-    intake.withdraw(submission=entries[1], actor=owner, now=now)
+    for submission in (entries[1], passing):
+        intake.withdraw(submission=submission, actor=owner, now=now)
     root = get(client, f"/board/test/?at={now - timedelta(days=2):%Y-%m-%d}")
     section = root.one("section", **{"aria-labelledby": "changes"})
     changed = [
@@ -125,6 +126,7 @@ def test_past_board_lists_what_has_changed_since(
     assert [row[:3] for row in changed[:2]] == [("New", "new", "1"), ("M1.05", "down 1", "1 → 2")]
     assert changed[-1][:2] == ("M1.1", "withdrawn")
     assert changed[-1][2].endswith(" → –")
+    assert "Passing" not in {row[0] for row in changed}, "it came and was withdrawn in between"
     assert "Deep Scale" in {row[0] for row in changed if row[1] == "down 1"}
     assert get(client, "/board/test/").all("section", **{"aria-labelledby": "changes"}) == []
 
@@ -135,7 +137,10 @@ def test_a_day_before_the_first_edition_says_so_and_offers_another_day(
     PublishedResult.objects.all().delete()
     root = get(client, "/board/test/?at=2020-01-01")
     first = f"its first edition was published on {Publication.objects.get().at:%Y-%m-%d}."
-    assert f"There was no Test board yet on 2020-01-01: {first}" in root.one("p", class_="notice").text
+    message = root.one("div", class_="no-rows")
+    assert f"There was no Test board yet on 2020-01-01: {first}" in message.text
+    assert [a.attributes["href"] for a in message.all("a")] == ["?"]
+    assert root.all("section", **{"aria-labelledby": "changes"}) == [], "everything has come since"
     day = root.one("details", class_="as-of").one("input", type="date").attributes
     assert (day["value"], day["max"]) == ("2020-01-01", f"{timezone.now() - timedelta(days=1):%Y-%m-%d}")
 
@@ -221,7 +226,10 @@ def test_withdrawn_entry_leaves_its_mark_in_a_former_edition(
     assert row.one("div", class_="name").text == f"M1.05 withdrawn {withdrawn_at:%Y-%m-%d}"
     assert {cell.text for cell in row.all("td")} - {""} == {"–"}
     notices = [each.text for each in root.all("p", class_="notice")]
-    assert "1 row was withdrawn by its team. The scores were removed from all editions." in notices
+    assert (
+        "1 submission was withdrawn by its team: its row stays without scores and rank in every edition."
+        in notices
+    )
 
 
 def test_every_page_that_stays_has_its_own_canonical_address(client: Client, replaced: Edition) -> None:

@@ -9,6 +9,7 @@ from uuid import uuid4
 
 import pytest
 from django.contrib.auth.models import AnonymousUser
+from django.db.models import Q
 from django.test import Client
 from django.utils import timezone
 
@@ -17,6 +18,8 @@ from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import Attempt
 from leaderboard.models import Comparison, Edition, Method, Submission, User
 from leaderboard.web.charts import analysis_charts, board_charts, chart_views
+from leaderboard.web.charts.chart_options import Mark
+from leaderboard.web.charts.chart_series import Look, named_marks
 from tests import builders, pages
 from tests.pages import get
 
@@ -143,6 +146,27 @@ def test_the_front_is_what_nothing_beats_in_both(client: Client, entries: list[S
     assert front == [p for p in points if not any(q != p and q[0] <= p[0] and q[1] <= p[1] for q in points)]
 
 
+def test_chart_says_what_it_leaves_out_and_its_legend_has_every_mark(
+    client: Client, edition: Edition, entries: list[Submission]
+) -> None:
+    def notes() -> str:
+        return get(client, "/board/test/charts/").one("figure", **{"data-chart": "latency"}).text
+
+    Method.objects.update(latency_ms=3.5, hardware="one GPU")
+    builders.board_changed("test")
+    assert "Latency is self-reported on different hardware." in notes()
+    assert "No latency is given for SOT and Detection." in notes()
+    figure = get(client, "/board/test/charts/").one("figure", **{"data-chart": "latency"})
+    (legend, *_) = [each["option"]["legend"] for each in json.loads(figure.one("script").raw_text)["media"]]
+    assert {"name": "Pareto front", "icon": "circle"} in legend["data"], "a front of one mark is no line"
+
+
+def test_a_method_that_improves_on_itself_is_named_once() -> None:
+    front = [Mark(float(i), 9.0 - i, (name,)) for i, name in enumerate(["A", "A", "B"])]
+    items = named_marks("", front, range(3), Look())["data"]
+    assert [item.get("label") for item in items] == [{"show": False}, None, None]
+
+
 def test_a_board_with_nothing_to_draw_says_so_and_has_no_empty_chart(client: Client, benchmark: None) -> None:
     root = get(client, "/board/demo/charts/")
     assert root.all("figure") == []
@@ -202,6 +226,8 @@ def test_what_is_being_computed_is_no_missing_test_and_comes_by_itself(
     Comparison.objects.filter(pk=Comparison.objects.first().pk).update(differences=None, computed_at=None)
     names = [series["name"] for series in options_of(pairs_figure(client))["series"]]
     assert "computing…" in names, "most are ready"
+    words = get(client, "/board/test/charts/").one("section", id="pairs").text
+    assert "All pairs tested so far differ significantly (p < 0.05). Still computing: 1 pair." in words
     builders.infer_all()
     assert "hx-trigger" not in get(client, "/board/test/charts/").one("section", id="pairs").attributes
     cells = [mark for series in options_of(pairs_figure(client))["series"] for mark in series["data"]]
@@ -231,6 +257,10 @@ def test_resolution_of_each_column_is_a_table_of_ranges_and_metrics(
         return get(client, "/board/test/charts/").all("section", **{"aria-labelledby": "resolution"})
 
     assert resolutions() == [], "nothing is known yet"
+    builders.infer_all()
+    of_one = Q(first__submission=compared[0]) | Q(second__submission=compared[0])
+    Comparison.objects.filter(of_one).update(differences=None, computed_at=None)
+    assert resolutions() == [], "a median of some would change with each that comes"
     builders.infer_all()
     (section,) = resolutions()
     assert [head.text for head in section.one("thead").all("th")] == ["TTC range", "MiD ×10⁻⁴", "RTE %"]

@@ -4,16 +4,22 @@ import inspect
 import re
 
 import evaluator
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL
+from evaluator.scoring.differences import N_SIGN_FLIPS, PUBLISHED_DECIMALS
 from leaderboard.web.docs import guides, python_reference
 
-TEXT = python_reference.text()
+TEXTS = {name: python_reference.text(name) for name in python_reference.SECTIONS}
+TEXT = "\n".join(TEXTS.values())
+GUIDE = guides.files()["python-reference"].read_text(encoding="utf-8")
 ENTRIES = dict(re.findall(r"^### (\S+)\n(.*?)(?=^##|\Z)", TEXT, re.MULTILINE | re.DOTALL))
 
 
 def test_every_public_name_is_there_with_words() -> None:
     expected = {f"evaluator.{name}" for name in evaluator.__all__ if name != "__version__"}
-    for modules in python_reference.SECTIONS.values():
-        expected |= {f"{module}.{name}" for module, names in modules.items() for name in names}
+    assert re.findall(r"^- `[^`]*`(?::|\\\n) *\n", TEXT, re.MULTILINE) == []
+    for sections in python_reference.SECTIONS.values():
+        for modules in sections.values():
+            expected |= {f"{module}.{name}" for module, names in modules.items() for name in names}
     assert set(ENTRIES) == expected
     words = {
         name: re.sub(r"```.*?```", "", entry, flags=re.DOTALL).strip() for name, entry in ENTRIES.items()
@@ -26,14 +32,22 @@ def test_arguments_are_those_of_the_function() -> None:
     shown = ENTRIES["evaluator.write_predictions"]
     assert re.findall(r"^    (\w+):", shown, re.MULTILINE) == list(signature.parameters)
     assert "    ttc_s: ArrayLike | None = None,\n" in shown
+    assert f"| `DEFAULT_PROTOCOL` | `{DEFAULT_PROTOCOL}` |" in GUIDE
+    assert f"| `N_SIGN_FLIPS`, `PUBLISHED_DECIMALS` | {N_SIGN_FLIPS:,}; {PUBLISHED_DECIMALS} |" in GUIDE
     assert "timeout_s: float = 15.0,\n    retry_policy: RetryPolicy = …," in ENTRIES["evaluator.Client"]
 
 
-def test_the_page_has_the_reference_and_begins_each_part_with_links_to_its_names() -> None:
-    page = guides.guide("python-reference")
-    chapters = [heading.text for heading in page.chapters]
-    assert (chapters[0], chapters[-1]) == ("evaluator", "Starter kit")
-    anchors = {part.heading.anchor for part in page.parts}
-    links = set(re.findall(r"\]\(#([\w-]+)\)", TEXT))
+def test_each_page_has_its_reference_and_all_names_are_linked() -> None:
+    anchors = set()
+    for name, sections in python_reference.SECTIONS.items():
+        page = guides.guide(name)
+        assert [heading.text for heading in page.chapters] == list(sections)
+        anchors |= {f"{name}.md#{part.heading.anchor}" for part in page.parts}
+    links = set(re.findall(r"\]\((\S+\.md#[\w-]+)\)", TEXT))
     assert len(links) == len(ENTRIES)
     assert links <= anchors
+
+
+def test_a_type_links_to_the_class_of_its_own_package() -> None:
+    assert "#tsttc_baselinesmethodsmethod)" in ENTRIES["tsttc_baselines.running.run_method"]
+    assert "#evaluatorclientanswersmethod)" not in ENTRIES["tsttc_baselines.running.run_method"]

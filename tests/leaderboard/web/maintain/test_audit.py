@@ -13,6 +13,7 @@ from django.test import Client
 from leaderboard import audit
 from leaderboard.editions import policy
 from leaderboard.models import AuditEvent, Edition, Split, User
+from leaderboard.people import teams
 from tests import builders, pages
 from tests.leaderboard.web.test_every_page import assert_sound
 
@@ -147,7 +148,7 @@ def test_an_evaluation_names_its_edition_and_why_its_file_was_rejected(
     builders.score_all()
     shown = {row[4]: row[5] for row in rows(keeper.get(PAGE)) if row[3] in {"scored", "rejected"}}
     assert shown["Evaluation Owl net on Test"] == "edition: 1"
-    assert shown["Evaluation Broken on Test"].startswith("edition: 1 reason: ")
+    assert shown["Evaluation Broken on Test"].startswith("edition: 1; reason: ")
 
 
 def test_a_change_is_shown_from_what_to_what_and_fields_have_the_labels_of_the_form(
@@ -163,6 +164,21 @@ def test_a_change_is_shown_from_what_to_what_and_fields_have_the_labels_of_the_f
         "fields: frames used, paper link",
         "private → public",
     ]
+
+
+def test_an_override_has_the_labels_of_its_form_and_its_reason_comes_last(
+    keeper: Client, edition: Edition, owner: User, maintainer: User
+) -> None:
+    team = teams.team_of(user=owner)
+    builders.override(team, limit=40, window=timedelta(days=2), reason="A deadline.", actor=maintainer)
+    [details] = [row[5] for row in rows(keeper.get(PAGE)) if row[3] == "quota overridden"]
+    assert sorted(details.split("; ")[:-1]) == [
+        "split: Test",
+        "submissions per team: 40",
+        "time between submissions: none",
+        "time window: 2 days",
+    ]
+    assert details.endswith("; reason: A deadline.")
 
 
 # --- the role of a maintainer ----------------------------------------------------------------------------

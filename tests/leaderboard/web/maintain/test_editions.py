@@ -128,6 +128,7 @@ def test_comparison_is_the_previews_line_by_line(keeper: Client, rescored: Editi
     rows = root.one("table", class_="changes").one("tbody").all("tr")
     assert [row.one("th").one("a").text for row in rows] == [change.method for change in expected.changes]
     for row, change in zip(rows, expected.changes, strict=True):
+        assert f"{change.team}, sent {change.submitted_at:%Y-%m-%d}" in row.one("th").text
         cells = row.all("td")
         for cell, name in zip(cells[1:], SCORE_NAMES, strict=True):
             old, new, delta = change.old[name], change.new[name], change.delta[name]
@@ -153,7 +154,7 @@ def test_the_current_edition_shows_its_contents_who_published_it_and_its_changes
     assert "Publish again" not in root.text
     assert preview.preview(rescored).replaces == 1
     former = main_text(keeper, FIRST)
-    assert "What publishing it again would change compared with edition 2" in former
+    assert "What would change if it is published again compared with edition 2" in former
     assert "Publish again…" in former
 
 
@@ -193,7 +194,7 @@ def test_a_protocol_that_lacks_a_metric_says_who_loses_it(
     ]
     assert effects(get(keeper, f"{SECOND}publish/"))[:2] == effects(root)
     heads = [head.text for head in root.one("table", class_="changes").one("thead").all("th")]
-    assert heads[-1].endswith("not in toolkit")
+    assert heads[-1].endswith("removed")
     publish(draft)
     open_edition(protocol="tsttc-1")
     assert effects(get(keeper, "/maintain/test/editions/3/")) == [

@@ -97,7 +97,7 @@ def test_page_says_when_the_last_evaluation_finished_and_whether_a_worker_lives(
     finished_at = Evaluation.objects.get().finished_at
     assert finished_at is not None
     health.record_sweep()
-    assert f"finished {finished_at:%Y-%m-%d %H:%M} UTC. {seen_lately}" in main_text(keeper, QUEUE)
+    assert f"finished at {finished_at:%Y-%m-%d %H:%M} UTC. {seen_lately}" in main_text(keeper, QUEUE)
     assert "No evaluation has finished yet." in main_text(keeper, f"{QUEUE}?split=val")
 
 
@@ -289,7 +289,7 @@ def test_retrying_nothing_says_so_and_changes_nothing(
 
 def test_desk_says_what_the_queue_holds_and_leads_to_it(keeper: Client, all_three: object) -> None:
     root = get(keeper, "/maintain/")
-    assert "3 1 system error, 1 running, 1 waiting, the oldest for " in root.one("main").text
+    assert "3 evaluations: 1 system error, 1 running, 1 waiting, the oldest for " in root.one("main").text
     assert QUEUE in [a.attributes["href"] for a in root.one("main").all("a")]
 
 

@@ -98,8 +98,9 @@ def test_overrides_say_whose_why_by_whom_and_since_when(keeper: Client, override
     page = keeper.get(QUOTAS)
     [row] = cells(pages.page(page), "Overrides")
     assert row == [
-        *("Test", "Owls", "5 in 36 hours", "7", "They asked <i>nicely</i>."),
-        *("maintainer@example.org", f"{override.set_at:%Y-%m-%d %H:%M} UTC", "Edit", "Delete"),
+        *("Owls on Test", "5 in 36 hours", "7"),
+        f"“They asked <i>nicely</i>.” (maintainer@example.org, {override.set_at:%Y-%m-%d})",
+        "Edit the override for Owls on test Delete the override for Owls on test",
     ]
     assert "<i>nicely" not in page.text
 

@@ -32,7 +32,7 @@ def test_list_has_my_teams_submissions_with_state_and_errors(
     assert [row[3] for row in rows] == [
         "queued",
         "rejectedThe outermost value is a list",
-        "scored Compare Scored one",
+        "scoredBest of its method: compare with others: Scored one",
     ]
     mid = scored.evaluations.get().scores.get(metric="mid", ttc_range="overall").value
     assert [row[4] for row in rows] == ["–", "–", f"{mid:.1f}"]
@@ -122,7 +122,8 @@ def test_best_of_the_team_stands_on_top_and_rows_of_the_board_can_be_compared(
     main = pages.page(signed_in.get("/submissions/")).one("main")
     line = main.one("dl", class_="facts-list")
     (value,) = best.evaluations.get().scores.filter(metric="mid", ttc_range="overall").values_list("value")
-    assert line.text.startswith(f"Best on TestMiD {value[0]:.1f}: Mine, would be rank 2 of 7, +")
+    assert line.text.startswith(f"Best on TestMiD {value[0]:.1f} ×10⁻⁴: Mine, would be rank 2 of 7, ")
+    assert line.text.endswith(" behind the best, Foreign one (compare with Foreign one)")
     compare = f"/compare/?split=test&m={best.method_id}&m={theirs.method_id}"
     assert [html.unescape(a.attributes["href"]) for a in line.all("a")] == [
         "/board/test/",
@@ -132,7 +133,7 @@ def test_best_of_the_team_stands_on_top_and_rows_of_the_board_can_be_compared(
     assert signed_in.get(compare).status_code == 200
     links = {
         row.all("a")[0].attributes["href"]: [
-            a.attributes["href"] for a in row.all("a") if "Compare" in a.text
+            a.attributes["href"] for a in row.all("a") if "compare" in a.text
         ]
         for row in main.one("tbody").all("tr")
     }

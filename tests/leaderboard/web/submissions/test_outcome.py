@@ -8,7 +8,7 @@ from django.test import Client
 from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
-from leaderboard.models import Edition, Method, Score, Split, Submission, User
+from leaderboard.models import Edition, Method, PublishedResult, Score, Split, Submission, User
 from leaderboard.submissions import intake
 from tests import board_rows, builders, pages
 from tests.editions import board_now
@@ -78,8 +78,17 @@ def test_what_another_submission_of_the_method_surpasses_has_no_rank(
     )
     builders.score_all()
     root = look(signed_in, worse)
-    assert "Not the best: the board shows another" in root.one("main").text
+    shows = "would show" if visibility == "PRIVATE" else "shows"
+    assert f"Not the best of its method: the board {shows} another submission" in root.one("main").text
     assert "Rank" not in card(root)
+    strip = root.one("figure", class_="all-values")
+    assert "the tall mark is this submission, which the board does not show" in strip.text
+    n_on_board = PublishedResult.objects.filter(split="test").count() + (visibility == "PUBLIC")
+    words = strip.one("span", class_="spoken").text
+    assert sum(int(n) for n in re.findall(r"\d+", words)) == n_on_board, (
+        "the board's one of its method is drawn"
+    )
+    assert "Columns of the LaTeX row: rank (none" in root.one("main").text
     assert "Rank" in card(look(signed_in, better))
 
 
@@ -92,8 +101,8 @@ def test_what_may_be_the_best_is_marked_as_on_the_board(
         root = pages.page(signed_in.get(address))
         cell = root.one("div", class_="result").all("tr")[1].all("td")[0]
         assert "with-best" in cell.classes
-        assert cell.text.endswith(", statistically tied for best in its column (95% confidence)")
-        assert "grey: tied for best at 95% confidence" in root.one("main").text
+        assert cell.text.endswith(", may be the best of its column (95% confidence)")
+        assert "grey: may be the best (95% confidence)" in root.one("main").text
 
 
 # --- beside others ---------------------------------------------------------------------------------------

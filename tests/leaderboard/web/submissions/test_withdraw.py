@@ -106,12 +106,26 @@ def test_team_sees_when_its_file_is_not_scored_in_the_new_edition(
 def test_page_says_what_withdrawing_does_and_that_it_stays_done(signed_in: Client, sent: Submission) -> None:
     (link,) = [a for a in pages.page(signed_in.get(address(sent))).all("a") if a.text.startswith("Withdraw")]
     root = assert_sound(signed_in.get(link.attributes["href"]))
-    assert "I know that this cannot be undone." in root.one("main").text
+    assert "I understand that this cannot be undone." in root.one("main").text
     assert "removed from the current board and from all earlier editions" in root.one("main").text
     assert "It is the method’s only scored submission to Test. The row stays" in root.one("main").text
     assert root.one("main").one("button").text == "Withdraw"
     sent.refresh_from_db()
     assert sent.withdrawn_at is None
+
+
+def test_page_of_the_best_says_that_the_next_best_replaces_it(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
+    worse, better = (
+        builders.submit(owner, builders.predictions(edition, factor=factor)) for factor in (1.2, 1.1)
+    )
+    builders.score_all()
+    words = "It is the method’s best: the next-best submission to Test takes its place."
+    answers = [
+        words in signed_in.get(address(each, "withdraw/")).content.decode() for each in (worse, better)
+    ]
+    assert answers == [False, True]
 
 
 def test_withdrawing_asks_for_the_tick_that_publishing_asks_for(signed_in: Client, sent: Submission) -> None:
