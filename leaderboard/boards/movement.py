@@ -64,14 +64,14 @@ class Change:
 
 
 def changes(before: Sequence[Entry], after: Sequence[Entry]) -> list[Change]:
-    """Return the rows that are new, gone or withdrawn, or have another rank or value, by their rank now.
+    """Return the rows with another rank or value, those gone or withdrawn, and the new ones, each by rank.
 
     A row that came and was withdrawn in between is none of them.
     """
     former, present = ({entry.id: entry for entry in rows} for rows in (before, after))
     pairs = [Change(former.get(key), present.get(key)) for key in present | former]
     changed = [pair for pair in pairs if _state(pair.before) != _state(pair.after)]
-    return sorted(changed, key=lambda pair: (pair.after is None, _order(pair.entry)))
+    return sorted(changed, key=lambda pair: (pair.before is None, pair.after is None, _order(pair.entry)))
 
 
 def _state(entry: Entry | None) -> tuple[object, ...] | None:

@@ -15,6 +15,7 @@ class ChangedRow(NamedTuple):
     """A changed row: what happened, and its rank and ranking score before and now."""
 
     entry: Entry
+    is_new: bool
     words: str
     rank: str
     value: str
@@ -30,6 +31,7 @@ def changed_rows(board: Board) -> list[ChangedRow]:
     return [
         ChangedRow(
             entry=change.entry,
+            is_new=change.before is None,
             words=_words(change),
             rank=_then_now(change, lambda entry: str(entry.rank or ABSENT)),
             value=_then_now(
@@ -47,7 +49,7 @@ def _words(change: Change) -> str:
     if after.withdrawn_at:
         return "withdrawn"
     if before is None:
-        return "new"
+        return ""
     if before.value != after.value:
         return "another value"
     if before.rank is None or after.rank is None:
