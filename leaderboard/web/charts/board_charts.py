@@ -41,11 +41,14 @@ MAX_BEHIND: Final = 500
 # Fewer are no progress: a line straight up.
 MIN_DATES: Final = 3
 # Fewer have no front worth a drawing.
-_MIN_LATENCIES: Final = 3
+_MIN_LATENCIES: Final = 4
+# So many methods without a latency are named.
+_MAX_UNTIMED: Final = 6
 # Up to so many points have room for a name each.
 _FEW_POINTS: Final = 5
 _OF_YEARS: Final = "Rows quoted from papers are placed in the middle of their year."
 _OF_LATENCY: Final = "Latency is self-reported on different hardware."
+_QUOTED_LATENCY: Final = "Latency is as printed in the papers, on different hardware."
 
 
 # --- a front and what lies behind it ---------------------------------------------------------------------
@@ -300,7 +303,8 @@ def latency(entries: Sequence[Entry], *, metric: Metric) -> Chart:
         points, metric, line="Pareto front", praise="on the Pareto front", end=last
     )
     untimed = [entry.method for entry in ranked if entry.details["latency_ms"] is None]
-    missing = f"No latency is given for {listed(untimed)}." if untimed else ""
+    missing = f"No latency is given for {listed(untimed, n_named=_MAX_UNTIMED)}." if untimed else ""
+    source = _OF_LATENCY if any(each.entry.kind == "submission" for each in points) else _QUOTED_LATENCY
     frame = Frame(
         x_axes=[x_axis("Latency in ms (log scale)", log_axis((each.x for each in points), room=_BESIDE))],
         y_axes=[error_axis(metric, [each.y for each in points], room=_ROOM)],
@@ -326,5 +330,5 @@ def latency(entries: Sequence[Entry], *, metric: Metric) -> Chart:
             for each, value in zip(points, _value_cells(points), strict=True)
         ),
         numbers=(2, 4),
-        note=" ".join(each for each in (_OF_LATENCY, missing, note) if each),
+        note=" ".join(each for each in (source, missing, note) if each),
     )

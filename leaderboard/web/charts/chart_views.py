@@ -9,7 +9,7 @@ from django.shortcuts import render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
-from evaluator.metrics.protocol import OVERALL, grouped_names, range_of
+from evaluator.metrics.protocol import grouped_names
 from evaluator.scoring.results import format_rounded
 from evaluator.tables import sentences
 from leaderboard.boards import snapshots
@@ -21,7 +21,7 @@ from leaderboard.statistics import comparisons
 from leaderboard.statistics.comparisons import Pair
 from leaderboard.web.charts import board_charts, profile_chart, significance_chart
 from leaderboard.web.charts.chart_options import Chart
-from leaderboard.web.charts.range_leaders import range_leaders
+from leaderboard.web.charts.range_leaders import range_leaders, range_words
 from leaderboard.web.lookups import split_or_404
 
 N_PROFILES = 5
@@ -66,8 +66,7 @@ def _resolution(board: Board, pairs: Sequence[Pair]) -> list[tuple[str, list[str
     rows: dict[str, list[str]] = {}
     for names in grouped_names(board.rules.score_names).values():
         for name in names:
-            ttc_range = range_of(name)
-            cells = rows.setdefault(ttc_range.seconds if ttc_range else OVERALL, [])
+            cells = rows.setdefault(range_words(name), [])
             cells.append(format_rounded(known.get(name), decimals=decimals))
     return list(rows.items()) if known else []
 

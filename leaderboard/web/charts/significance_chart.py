@@ -1,5 +1,6 @@
 """The chart of significance: every pair of the first rows of a board, by the p-value of what ranks them."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -114,7 +115,10 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
 
 
 def alike_words(pairs: Sequence[Pair]) -> str:
-    """Say which tested pairs do not differ significantly; empty without a tested pair."""
+    """Say which tested pairs do not differ significantly; empty without a tested pair.
+
+    The tests are not corrected for their number, but rank ranges are.
+    """
     tested = [pair for pair in pairs if pair.difference and pair.difference.p_below is not None]
     alike = [pair for pair in tested if not pair.difference.is_significant]  # type: ignore[union-attr]  # tested
     n_waiting = sum(pair.differences is None for pair in pairs)
@@ -124,6 +128,8 @@ def alike_words(pairs: Sequence[Pair]) -> str:
     if len(alike) > _MAX_NAMED:
         n_tested = counted(len(tested), "tested pair")
         return f"{len(alike)} of {n_tested} do not differ significantly (p\u00a0≥\u00a00.05).{rest}"
+    if any(_may_be_alike(pair) for pair in tested if pair not in alike):
+        rest += " Rank ranges are corrected for the number of tests, so some of them still overlap."
     named = [
         " and ".join(f"{entry.method} (rank {entry.rank})" for entry in (pair.first, pair.second))
         for pair in alike
@@ -131,6 +137,11 @@ def alike_words(pairs: Sequence[Pair]) -> str:
     but = f", except {'; '.join(named)}" if named else ""
     those = "pairs tested so far" if n_waiting else "tested pairs"
     return f"All {those} differ significantly (p\u00a0<\u00a00.05){but}.{rest}"
+
+
+def _may_be_alike(pair: Pair) -> bool:
+    better, worse = pair.first.interval, pair.second.interval
+    return (better.rank_high or 0) >= (worse.rank_low or math.inf)
 
 
 def _series(name: str, pair_cells: Sequence[_Cell]) -> Option:

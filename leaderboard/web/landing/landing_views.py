@@ -92,7 +92,7 @@ def _leading(main: Split, *, now: datetime) -> dict[str, Any]:
         "board": board,
         "leaders": leaders(board),
         "lead": lead_words(board),
-        "range_leaders": range_leaders(board),
+        "range_leaders": range_leaders(board)[1:],  # who leads overall stands above
         "profile": profile_chart.profile(board.entries[:N_LEADERS], n_metrics=2),
         "progress": chart_views.progress(board, now=now),
     }

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -15,15 +16,21 @@ from django.utils import timezone
 
 from evaluator.metrics.registry import MID, WARNING
 from leaderboard.boards import snapshots
+from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.boards.snapshots import Attempt
 from leaderboard.models import Comparison, Edition, Method, Submission, User
+from leaderboard.statistics import comparisons
+from leaderboard.statistics.comparisons import Pair
 from leaderboard.web.charts import analysis_charts, board_charts, chart_views
 from leaderboard.web.charts.chart_options import Mark
 from leaderboard.web.charts.chart_series import Look, named_marks
+from leaderboard.web.charts.significance_chart import alike_words
 from tests import builders, pages
 from tests.pages import get
 
 pytestmark = pytest.mark.slow
+
+RANGES = ["overall", "0–3 s crucial", "3–6 s small", "6–20 s large", "−20–0 s negative"]
 
 
 def rows(client: Client, chart: str) -> list[list[str]]:
@@ -179,13 +186,9 @@ def test_leaders_by_range_stand_below_their_chart_as_a_table(
 ) -> None:
     root = get(client, "/board/test/charts/")
     leads = root.one("section", **{"aria-labelledby": "leaders"}).one("tbody")
-    assert [row.one("th").text for row in leads.all("tr")] == [
-        "0–3 s crucial",
-        "3–6 s small",
-        "6–20 s large",
-        "−20–0 s negative",
-    ]
-    assert leads.text == get(client, "/").one("table", class_="attempts-list").one("tbody").text
+    assert [row.one("th").text for row in leads.all("tr")] == RANGES
+    on_landing = get(client, "/").one("table", class_="attempts-list").one("tbody")
+    assert leads.text == f"{leads.all('tr')[0].text}{on_landing.text}", "there the leaders stand above"
 
 
 def test_private_methods_are_in_no_chart_not_even_their_teams(
@@ -265,13 +268,7 @@ def test_resolution_of_each_column_is_a_table_of_ranges_and_metrics(
     (section,) = resolutions()
     assert [head.text for head in section.one("thead").all("th")] == ["TTC range", "MiD ×10⁻⁴", "RTE %"]
     rows_of_ranges = section.one("tbody").all("tr")
-    assert [row.one("th").text for row in rows_of_ranges] == [
-        "overall",
-        "0–3 s",
-        "3–6 s",
-        "6–20 s",
-        "−20–0 s",
-    ]
+    assert [row.one("th").text for row in rows_of_ranges] == RANGES
     assert all(float(cell.text) > 0 for cell in rows_of_ranges[0].all("td"))
 
 
@@ -290,6 +287,26 @@ def test_pairs_that_do_not_differ_are_named_above_the_map(
         "All tested pairs differ significantly (p < 0.05), except M1.05 (rank 1) and Twin (rank 1)."
         in words()
     )
+
+
+def test_rank_ranges_that_overlap_although_their_pairs_differ_are_explained(
+    compared: list[Submission],
+) -> None:
+    def pairs() -> tuple[Pair, ...]:
+        (split,) = [each for each in snapshots.splits() if each.pk == "test"]
+        return comparisons.of_first(board=snapshots.board(split=split, viewer=AnonymousUser()))
+
+    def certain(entry: Entry) -> Entry:
+        ranks = ConfidenceInterval(rank_low=entry.rank, rank_high=entry.rank)
+        return replace(entry, intervals={entry.primary: ranks})
+
+    pairs()
+    builders.infer_all()
+    sentence = " Rank ranges are corrected for the number of tests, so some of them still overlap."
+    words = alike_words(pairs())
+    assert words.endswith(sentence)
+    apart = [replace(pair, first=certain(pair.first), second=certain(pair.second)) for pair in pairs()]
+    assert alike_words(apart) == words.removesuffix(sentence)
 
 
 def test_pairs_that_are_withheld_show_their_published_difference_alone(
