@@ -124,12 +124,15 @@ _WHY: Final = " Why: "
 """In a note, between what is so and its derivation, which the page folds."""
 
 
-def _groups(tables: Sequence[PrintedTable]) -> dict[str, list[PrintedTable]]:
-    """Group the tables for the index: what was measured, what was varied, and what the data is."""
-    groups: dict[str, list[PrintedTable]] = {"Results": [], "Ablations": [], "Dataset": []}
-    for each in tables:
+def _groups(tables: Sequence[PrintedTable]) -> dict[str, list[tuple[PrintedTable, Chart]]]:
+    """Group the tables for the index: what was measured, what was varied, and what the data is.
+
+    Those with a chart come first: two stand side by side, and one without a chart would leave a hole.
+    """
+    groups: dict[str, list[tuple[PrintedTable, Chart]]] = {"Results": [], "Ablations": [], "Dataset": []}
+    for each, chart in sorted(((each, sweep(each)) for each in tables), key=lambda pair: not pair[1]):
         kind = "Ablations" if each.table.parameter else "Results"
-        groups[kind if each.table.is_result else "Dataset"].append(each)
+        groups[kind if each.table.is_result else "Dataset"].append((each, chart))
     return groups
 
 
@@ -164,13 +167,13 @@ def published_page(request: HttpRequest) -> HttpResponse:
         "tables": [
             {
                 "shown": each,
-                "chart": sweep(each),
+                "chart": chart,
                 "rows": [
                     (row, zip(each.headings, row.cells, strict=True), best) for row, best in _with_best(each)
                 ],
                 "notes": [note.partition(_WHY)[::2] for note in each.table.notes],
             }
-            for each in chain.from_iterable(groups.values())
+            for each, chart in chain.from_iterable(groups.values())
         ],
         "groups": groups,
         "source": published_tables().source,
