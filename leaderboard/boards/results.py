@@ -27,7 +27,7 @@ class Result:
     n_ranked: int
     attempts: tuple[Attempt, ...]  # its active, scored submissions, the newest first
     rows: tuple[Entry, ...]  # those that everybody sees
-    best: Entry | None  # of the others among them; None without any
+    best: Entry | None  # of the others among them, as the viewer reads it; None without any
     neighbours: tuple[Entry, ...]  # up to two of them, of the nearest rank
 
     @property
@@ -84,7 +84,7 @@ def results(
         # What is private is not among what everybody sees.
         own = snapshots.attempts(edition, methods=Method.objects.filter(pk=method.pk)) if not is_shown else ()
         attempts = own or tuple(each for each in drawn.attempts if each.method_id == method.pk)
-        others = _others(entry, drawn.entries)
+        others = _others(entry, [row for row in entries if row.is_visible_to_all])
         best = others[0] if others else None
         neighbours = _neighbours(entry, others)
         edition.split = split  # It is at hand, and would be asked for again.

@@ -141,7 +141,7 @@ def sparkline(values: Sequence[float]) -> SafeString:
     """Draw values in their order as a line, the lowest marked."""
     low = min(values)
     heights = WhiskerScale(low, max(low + 1e-9, *values))
-    spread = WhiskerScale(0.0, max(1.0, len(values) - 1.0))
+    spread = WhiskerScale(0.0, max(1.0, len(values) - 1.0), margin=2.0)
     points = [(f"{spread.percent(i):g}", f"{100 - heights.percent(v):g}") for i, v in enumerate(values)]
     lines = format_html_join(
         "",

@@ -113,11 +113,11 @@ def test_head_says_the_score_its_lead_and_the_way_there(client: Client, method: 
     )
     card = main.one("dl", class_="score-card")
     assert f"Lead over the second{best - own:.1f} ×10⁻⁴Deep Scale, {best}" in card.text
-    assert "2 submissions over time" in card.text
+    assert "2 submissions, in order" in card.text
     assert len(card.all("svg", class_="sparkline")) == 1
     Method.objects.update(visibility=Visibility.ANONYMOUS)
     builders.board_changed("test")
-    assert "over time" not in get(client, method).one("main").text, "nobody knows the order within a day"
+    assert "in order" not in get(client, method).one("main").text, "nobody knows the order within a day"
     strip = main.one("figure", class_="all-values")
     assert strip.one("span", class_="spoken").text == "MiD of all methods: 0 lower, 5 not."
     assert len(strip.one("svg", class_="strip").all("line", class_="own")) == 1
