@@ -181,4 +181,4 @@ def sentence(board: Board, *, is_filtered: bool) -> str:
         return f"{grouped(len(board.entries))} of {counted(board.n_in_all, 'result')}"
     n_private = sum(not entry.is_visible_to_all for entry in board.entries)
     results = counted(board.n_in_all - n_private, "result")
-    return f"{results}, {grouped(n_private)} private" if n_private else results
+    return f"{results} and {grouped(n_private)} private" if n_private else results

@@ -157,7 +157,7 @@ def test_my_teams_rows_are_marked_and_its_private_ones_stand_on_its_own_board_al
             "mine" in row_of(root, "Foo").classes,
             "private" in root.one("table", class_="board").one("tbody").text,
         )
-        assert ("6 results, 1 private" in root.one("main").text) == (user != stranger)
+        assert ("6 results and 1 private" in root.one("main").text) == (user != stranger)
         assert row_of(root, "Foo").one("circle", class_="ring").attributes == ring, "on the public scale"
     assert seen == {"Owls": (True, True), "Mate": (True, True), "Strangers": (False, False)}
 
