@@ -55,7 +55,7 @@ def lead_words(board: Board) -> str:
 
 def _why_unknown(board: Board, leader: Entry) -> str:
     if leader.kind == "published":
-        return "papers report no values per recording."
+        return "the paper reports no values per recording."
     reason = confidence.why_no_interval(board.edition) if board.edition else ""
     # As the end of a sentence.
     return f"{reason[:1].lower()}{reason[1:]}" or "the confidence intervals are being computed."

@@ -143,7 +143,7 @@ def test_a_site_without_any_split_has_a_landing_page_and_no_main_board(client: C
 
 def test_a_lead_of_rows_from_papers_is_not_known_to_be_significant(client: Client, benchmark: None) -> None:
     assert alone(client) == (
-        "We cannot tell whether the lead is significant: papers report no values per recording."
+        "We cannot tell whether the lead is significant: the paper reports no values per recording."
     )
 
 
