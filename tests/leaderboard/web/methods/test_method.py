@@ -138,6 +138,19 @@ def test_nearby_ranks_are_those_that_they_would_be_beside_a_private_method(
     assert "Ranks as if this method were public. A row quoted from a paper cannot be tested" in main.text
 
 
+def test_own_anonymous_method_among_nearby_ranks_has_its_name_for_its_team_alone(
+    client: Client, method: Method, edition: Edition, owner: User
+) -> None:
+    builders.submit(owner, builders.predictions(edition, factor=1.06), method="Bar", visibility="ANONYMOUS")
+    builders.score_all()
+    pseudonym = Method.objects.get(name="Bar").pseudonym
+    for reader, name in ((None, pseudonym), (owner, f"Baryours, shown as {pseudonym}")):
+        if reader:
+            client.force_login(reader)
+        rows = get(client, method).one("table", class_="gaps").one("tbody").all("tr")
+        assert [row.one("th").text for row in rows][:2] == ["This method", name]
+
+
 def test_nearby_differences_have_their_intervals_once_a_worker_has_computed_them(
     client: Client, benchmark: None, tmp_path: Path, owner: User, stranger: User
 ) -> None:
