@@ -38,7 +38,7 @@ def test_arguments_are_those_of_the_function() -> None:
     assert "timeout_s: float = 15.0,\n    retry_policy: RetryPolicy = …," in ENTRIES["evaluator.Client"]
 
 
-def test_a_function_is_told_from_a_class() -> None:
+def test_a_function_differs_from_a_class() -> None:
     assert "### evaluator.evaluate()\n" in TEXT
     assert "### evaluator.Manifest\n\n```text\nclass Manifest(" in TEXT
 
