@@ -98,7 +98,7 @@ def scale_ratio_of_boxes(reference: ArrayLike, target: ArrayLike, *, measure: Me
     without size give NaN or infinity.
 
     >>> reference, target = [0, 0, 8, 8], [0, 0, 10, 10]
-    >>> ratios = [scale_ratio_of_boxes(reference, target, measure=m) for m in MEASURES]
+    >>> ratios = (scale_ratio_of_boxes(reference, target, measure=m) for m in MEASURES)
     >>> [round(float(ratio), 2) for ratio in ratios]
     [0.64, 0.8, 0.8, 0.8]
     """
