@@ -98,7 +98,8 @@ def scale_ratio_of_boxes(reference: ArrayLike, target: ArrayLike, *, measure: Me
     without size give NaN or infinity.
 
     >>> reference, target = [0, 0, 8, 8], [0, 0, 10, 10]
-    >>> [round(float(scale_ratio_of_boxes(reference, target, measure=m)), 2) for m in MEASURES]
+    >>> ratios = (scale_ratio_of_boxes(reference, target, measure=m) for m in MEASURES)
+    >>> [round(float(ratio), 2) for ratio in ratios]
     [0.64, 0.8, 0.8, 0.8]
     """
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -114,7 +115,9 @@ def scale_ratio_of_boxes(reference: ArrayLike, target: ArrayLike, *, measure: Me
 def is_usable(box: ArrayLike, *, min_side_px: float = 0.0) -> bool:
     """Whether all four numbers are finite and both sides are greater than `min_side_px`.
 
-    >>> is_usable([10, 20, 30, 50]), is_usable([30, 20, 10, 50]), is_usable([10, 20, np.nan, 50])
-    (True, False, False)
+    >>> is_usable([10, 20, 30, 50])
+    True
+    >>> is_usable([30, 20, 10, 50]) or is_usable([10, 20, np.nan, 50])
+    False
     """
     return bool(np.all(np.isfinite(np.asarray(box, dtype=np.float64))) and np.all(size_of(box) > min_side_px))

@@ -158,7 +158,7 @@ class SequenceFolder:
 
 
 def read_folder(path: str | os.PathLike[str]) -> SequenceFolder:
-    """Read a folder of this convention, or the downloaded dataset.
+    """Read the folder of `tsttc baseline run`: tables and images; or the downloaded dataset.
 
     Raises `Rejected` for other folders and for faulty tables or annotation files; boxes and images are
     checked later.
@@ -193,7 +193,7 @@ def read_folder(path: str | os.PathLike[str]) -> SequenceFolder:
 
 
 def read_folder_truth(path: Path) -> GroundTruth:
-    """Read the ground truth of a folder, a table or annotation files; raises `Rejected` for neither."""
+    """Read `truth.csv` or the annotation files of a folder; raises `Rejected` if it has neither."""
     if (path / TRUTH).is_file():
         return read_truth(path / TRUTH)
     if not list_files(path):

@@ -12,7 +12,7 @@ class MailKind(models.TextChoices):
 
     ACCOUNT = "account", "Your account"
     SCORED = "scored", "A file that I submitted on the site is scored, is rejected or fails"
-    EDITION = "edition", "A board with methods of my team has a new edition"
+    EDITION = "edition", "A board that lists my team’s methods gets a new edition"
     TOKEN = "token", "One of my API tokens expires within a week"
     DEADLINE = "deadline", "A split that my team submitted to closes within three days"
     ANNOUNCEMENT = "announcement", "There is an announcement about a split that my team submitted to"

@@ -68,10 +68,7 @@ def refusal_for_all(split: Split, *, now: datetime) -> Refused | None:
     if split.is_archived:
         code, sentence = "split-closed", "are closed: the split is archived."
     elif not split.has_ground_truth:
-        code, sentence = (
-            "split-not-open",
-            "open once the organisers provide the ground truth.",
-        )
+        code, sentence = "split-not-open", "open once the maintainers provide the ground truth."
     elif opens_at and now < opens_at:
         code, sentence = "split-not-open", f"open at {opens_at:%Y-%m-%d %H:%M} UTC."
     elif closes_at and now >= closes_at:

@@ -58,7 +58,7 @@ class ConfirmForm(SiteForm):
 class DescriptionForm(SiteForm):
     description = forms.CharField(
         required=False,
-        help_text="One or two sentences: what the method does and which inputs it uses.",
+        help_text="One or two sentences: what the method does, and its inputs. `Backticks` mark code.",
         widget=forms.Textarea(attrs={"rows": 4, "maxlength": 2000}),
     )
     paper_url = forms.CharField(label="Paper", required=False, widget=forms.URLInput(attrs=_ADDRESS))

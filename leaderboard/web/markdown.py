@@ -20,9 +20,9 @@ _TARGET: Final = re.compile(r"(?:https?:|mailto:|/|#|\?)", re.IGNORECASE)
 # A cell up to so many characters stays in one line; a longer one than the second number gets a column's room.
 _MAX_TOGETHER: Final = 14
 _MIN_WRAPS: Final = 40
-# An option of a command, which a browser would break at its hyphens.
+# An option or a name in code, which a browser would break at its hyphens.
 _CODE: Final = re.compile(r"<code\b.*?</code>", re.DOTALL)
-_OPTION: Final = re.compile(r"(?<=[\s>\[])--?[a-z][\w-]*")
+_HYPHENED: Final = re.compile(r"(?<=[\s>\[])(?:--?[a-z]|[A-Za-z]+-)[\w-]*")
 _TABLE: Final = re.compile(r"<table>\n(.*?)</table>", re.DOTALL)
 
 
@@ -177,7 +177,7 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
                 token.tag = tokens[at + 2].tag = "td"  # a head without words names nothing
     parts.append(Part(heading, " ".join(filter(None, [*texts, *code])), " ".join(prose)))
     html = parser.renderer.render(tokens, parser.options, {})
-    html = _CODE.sub(lambda code: _OPTION.sub(r'<span class="together">\g<0></span>', code[0]), html)
+    html = _CODE.sub(lambda code: _HYPHENED.sub(r'<span class="together">\g<0></span>', code[0]), html)
     html = _TABLE.sub(_framed, html)
     # The parser escapes what is no markup of its own.
     drawn = SafeString(html)

@@ -140,7 +140,7 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric], references: Sequence[Re
         ),
         numbers=tuple(range(1, len(columns))),
         has_intervals=has_intervals,
-        note=f"{WARNING.symbol} is drawn from 0 to {_NEAR_S:g} s. It is at most 1% at all other times."
+        note=f"{WARNING.symbol} is shown for 0 to {_NEAR_S:g} s. It is at most 1% at all other times."
         if axes.get(WARNING, _TTC_AXIS) is not _TTC_AXIS
         else "",
     )

@@ -123,7 +123,7 @@ def _forest(
     below = [-each.low for _, each in to_best if each.low is not None and each.low < 0]
     start = -svg.scale_end(below) if below else 0.0
     if not to_best:
-        return (), SafeString()
+        return (), SafeString("")
     origin = ForestRow(best, svg.difference(end, 0.0, None, None, start=start), "0", "")
     rows = tuple(
         ForestRow(

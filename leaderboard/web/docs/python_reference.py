@@ -143,7 +143,8 @@ def _entry(name: str, module: str) -> Iterator[str]:
     """
     home = _homes()[name] if module == "evaluator" else module
     body = _tree(home).body
-    yield f"### {module}.{name}"
+    is_function = any(isinstance(node, ast.FunctionDef) and node.name == name for node in body)
+    yield f"### {module}.{name}{'()' if is_function else ''}"
     yield ""
     for number, node in enumerate(body):
         if isinstance(node, _Definition) and node.name == name:
@@ -190,7 +191,7 @@ def _signature(node: _Definition) -> str:
         is_keyword_only = any("kw_only=True" in ast.unparse(mark) for mark in node.decorator_list)
         parts = _arguments(made) if made else [*(["*"] if is_keyword_only else []), *fields]
         is_abstract = any(ast.unparse(base) in {"Protocol", "Exception"} for base in node.bases)
-        return "" if is_abstract else _wrapped(node.name, parts, "")
+        return "" if is_abstract else _wrapped(f"class {node.name}", parts, "")
     return _wrapped(node.name, _arguments(node), _result(node))
 
 

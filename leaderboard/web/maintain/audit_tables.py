@@ -3,7 +3,6 @@
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
-from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 from django.core.exceptions import ValidationError
@@ -64,11 +63,12 @@ def noun_words(noun: str) -> str:
 
 
 class Subject(NamedTuple):
-    """The name of what an event is about, its page if it has one, and facts that tell it from others."""
+    """What an event is about: its name, its page if it has one, what tells it from others, why it failed."""
 
     name: str
     href: str = ""
-    facts: Mapping[str, str] = MappingProxyType({})
+    about: str = ""
+    reason: str = ""
 
 
 class AuditRow(NamedTuple):
@@ -116,11 +116,9 @@ def _details(
     texts |= {name: text or "(blanked)" for name, text in named(event, names).items()}
     if texts.get("from") and texts.get("to"):
         texts = {"": f"{texts.pop('from')} → {texts.pop('to')}"} | texts
-    facts = {**subjects.get((event.noun, event.noun_id), Subject("")).facts}
-    if event.verb != "rejected":
-        facts.pop("reason", None)
-    texts = facts | texts
-    texts["reason"] = texts.pop("reason", "")  # A sentence: it comes last.
+    subject = subjects.get((event.noun, event.noun_id))
+    fault = subject.reason if subject and event.verb == "rejected" else ""
+    texts["reason"] = texts.pop("reason", fault)  # A sentence: it comes last.
     return [(_label(name), text) for name, text in texts.items() if text]
 
 
@@ -172,13 +170,14 @@ def _is_key(model: type[Model], text: str) -> bool:
 
 
 def _submission(row: Submission) -> Subject:
-    return Subject(f"{row.method.name} on {row.split.title}", reverse("submission", args=[row.pk]))
+    sent = f"sent {row.submitted_at:%Y-%m-%d %H:%M} UTC"
+    return Subject(f"{row.method.name} on {row.split.title}", reverse("submission", args=[row.pk]), sent)
 
 
 def _evaluation(row: Evaluation) -> Subject:
+    sent = _submission(row.submission)
     reason = short_fault(row.problems[0]["message"]) if row.problems else ""
-    facts = {"edition": str(row.edition.number)} | ({"reason": reason} if reason else {})
-    return _submission(row.submission)._replace(facts=facts)
+    return sent._replace(about=f"edition {row.edition.number}, {sent.about}", reason=reason)
 
 
 _TABLES: Final[Mapping[str, tuple[Any, tuple[str, ...], Callable[[Any], Subject]]]] = {

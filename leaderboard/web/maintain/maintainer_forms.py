@@ -57,7 +57,7 @@ class OpenForm(SiteForm):
 
 class ReasonForm(SiteForm):
     reason = reason_field(
-        "Required: one or two sentences. The public changelog and the notice to the teams show them.",
+        "Required: one or two sentences. Shown in the public changelog and in the notice to the teams.",
         at="public changelog",
     )
 

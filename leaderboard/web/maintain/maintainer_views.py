@@ -96,7 +96,8 @@ def open_edition(request: HttpRequest, split: str) -> HttpResponse:
             )
             return redirect("maintain_edition", split, opened.number)
     choices = edition_tables.truth_choices(split_row, form.truths)
-    return form_page(request, "maintain/open.html", form, split=split_row, choices=choices)
+    drafts = split_row.editions.filter(published_at=None, discarded_at=None).select_related("ground_truth")
+    return form_page(request, "maintain/open.html", form, split=split_row, choices=choices, drafts=drafts)
 
 
 @maintainers_only

@@ -136,9 +136,9 @@ ACTIONS: Final[Mapping[str, Action]] = {
     ),
     "clear-texts": Action(
         Method,
-        "Delete the texts of the method",
+        "Delete the description and links of the method",
         "Description, paper link and code link are deleted. The team can write new ones.",
-        "Delete texts",
+        "Delete description and links",
         ActionForm,
         lambda subject, now, **arguments: hiding.clear_texts(method=subject, **arguments),
     ),
@@ -153,7 +153,8 @@ ACTIONS: Final[Mapping[str, Action]] = {
     "withdraw": Action(
         Submission,
         "Withdraw the submission",
-        "Its scores are removed from the board; its row stays, marked with the date. This cannot be undone.",
+        "Its scores are removed from every edition. Its row remains on the board, marked with the date. This "
+        "cannot be undone.",
         "Withdraw",
         FinalActionForm,
         lambda subject, **arguments: hiding.withdraw_entry(submission=subject, is_hidden=False, **arguments),
@@ -178,7 +179,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
     "close-account": Action(
         User,
         "Close the account",
-        "Nobody can sign in to it or use its tokens. Its entries stay.",
+        "Nobody can sign in to it or use its tokens. Its entries remain on the board.",
         "Close account",
         ActionForm,
         lambda subject, now, **arguments: hiding.set_active(user=subject, is_active=False, **arguments),
@@ -203,7 +204,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         User,
         "Forget the person",
         "The account, its addresses, tokens and invitations are deleted, also file names and notes. "
-        "A team without other members loses its name. Scores stay. This cannot be undone.",
+        "A team without other members loses its name. Scores remain on the board. This cannot be undone.",
         "Forget person",
         FinalActionForm,
         lambda subject, **arguments: forgetting.forget(user=subject, **arguments),

@@ -76,7 +76,8 @@ def _rule_effects(preview: Preview) -> Iterator[str]:
     """Word changes of the protocol, of the decimals and of the unit."""
     old, new = preview.published, preview.edition
     if old.protocol != new.protocol:
-        yield " ".join((f"The protocol {new.protocol} replaces {old.protocol}.", *_protocol_effects(preview)))
+        change = f"The protocol changes from {old.protocol} to {new.protocol}."
+        yield " ".join((change, *_protocol_effects(preview)))
     if old.decimals != new.decimals:
         yield f"Scores have {counted(new.decimals, 'decimal')} instead of {old.decimals}."
     if old.unit != new.unit:
@@ -91,15 +92,15 @@ def _protocol_effects(preview: Preview) -> Iterator[str]:
         if metric not in new.metrics:
             n = sum(_has(e.old, metric) and e.new_status == Status.SCORED for e in entries)
             loss = f": {_share(n, preview)} lose{'s' * (n == 1)} this score" if n else ""
-            yield f"It has no {_title(metric)}{loss}."
+            yield f"The new one does not compute the {_title(metric)}{loss}."
     for metric in new.metrics:
         if metric not in old.metrics:
             n = sum(_has(e.new, metric) for e in entries)
             gain = f": {_share(n, preview)} get{'s' * (n == 1)} this score" if n else ""
-            yield f"It adds the {_title(metric)}{gain}."
+            yield f"The new one adds the {_title(metric)}{gain}."
     for one, other, verb in ((old, new, "has no"), (new, old, "adds the")):
         gone = (each for each in one.ranges if each not in other.ranges)
-        yield from (f"It {verb} TTC range {each.name} ({each.seconds})." for each in gone)
+        yield from (f"The new one {verb} TTC range {each.name} ({each.seconds})." for each in gone)
     if old.primary != new.primary:
         yield f"{new.primary.symbol} ranks the board instead of {old.primary.symbol}."
 

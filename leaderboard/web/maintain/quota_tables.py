@@ -1,13 +1,16 @@
 """Quotas in words: rules, and the slots that a team has left."""
 
 from datetime import datetime
-from typing import Any
+from typing import Any, Final
 
 from leaderboard.models import Split, Team, User
 from leaderboard.models.quotas import QuotaRules
 from leaderboard.quotas import usage
+from leaderboard.quotas.admissions import refusal_for_all
 from leaderboard.quotas.spans import span
 from leaderboard.web.formatting import grouped
+
+_CLOSED: Final = {"split-not-open": "not open yet", "split-closed": "closed"}
 
 
 def rules_of(row: QuotaRules) -> dict[str, str]:
@@ -62,6 +65,7 @@ def team_rows(team: Team, *, viewer: User, now: datetime) -> list[dict[str, Any]
             "rules": rules_of(own.get(split.pk, split)),
             "quota": usage.state(team=team, user=viewer, split=split, now=now),
             "admission": admitted.get(split.pk),
+            "closed": _CLOSED[refusal.code] if (refusal := refusal_for_all(split, now=now)) else "",
         }
         for split in Split.objects.all()
     ]

@@ -6,7 +6,10 @@ from datetime import datetime
 from typing import Any, Final, NamedTuple
 
 from django import forms
+from django.urls import reverse_lazy
+from django.utils.functional import lazy
 from django.utils.html import format_html
+from django.utils.safestring import SafeString
 
 from leaderboard.editions import deadlines
 from leaderboard.editions.policy import MAX_DESCRIPTION, MAX_POSITION, NAMES, POSITION_FAULT, Policy
@@ -19,9 +22,16 @@ from leaderboard.web.maintain.quota_forms import QuotaRulesForm
 
 _ZONE: Final = "Add the time zone: UTC, AoE or +01:00."
 _KEEP_SMALL: Final = (
-    "Every extra split on the same hidden ground truth gives teams more tries at the same hidden values. "
-    "Keep the quota small."
+    "If this split shares a hidden ground truth with another split, teams get more tries at the same hidden "
+    "values. Then keep the quota small."
 )
+
+_IMPORT: Final = "Leave the split switched off until you import them (import_truth)."
+_CHALLENGE: Final = "A challenge on the same labels. You can list it at once."
+
+
+def _choice(name: str, about: str) -> SafeString:
+    return format_html('<strong>{}</strong> <span class="quiet">{}</span>', name, about)
 
 
 class Section(NamedTuple):
@@ -95,20 +105,22 @@ class PolicyForm(QuotaRulesForm):
     decimals = forms.TypedChoiceField(
         choices=[(1, "one"), (2, "two")],
         coerce=int,
-        help_text="Decimal places of the scores, starting with the next edition. More decimals reveal more "
-        "about a hidden ground truth.",
+        help_text="Decimal places of the scores, from the next edition on. More decimals reveal more about a "
+        "hidden ground truth.",
     )
     needs_admission = forms.BooleanField(
         label="Only admitted teams can submit",
         required=False,
-        help_text="Admit each team under Teams, Quotas.",
+        help_text=lazy(format_html, SafeString)(
+            'After saving, admit each team: open it under <a href="{}">Teams</a>, then “Quotas”.',
+            reverse_lazy("maintain_teams"),
+        ),
     )
     how_to_be_admitted = forms.CharField(
         label="How to request access",
         required=False,
         max_length=300,
-        help_text="Shown to teams without access, after “Only admitted teams can submit”. Example: write to "
-        "board@example.org.",
+        help_text="Shown to teams that are not admitted. Example: write to board@example.org.",
     )
 
     layout: tuple[tuple[Section, ...], ...] = (
@@ -160,28 +172,23 @@ class NewSplitForm(PolicyForm):
         label="Ground truth",
         widget=forms.RadioSelect,
         initial="hidden",
-        help_text=format_html(
-            "New: leave the split switched off, import the ground truth with <code>{}</code>, then list the "
-            "split. Same as another split: you can list the split at once.",
-            "import_truth",
-        ),
         error_messages={"required": "No ground truth was chosen; expected one of those listed."},
     )
 
     field_order = ("name", "title", "truth")
     is_hidden = True
     layout = (
-        (Section("Required", field_order), Section("Display", ("description",), _DISPLAY_FIELDS)),
-        (_DATES, _ANNOUNCEMENT, Section("Quota", (), _QUOTA_FIELDS), _ADMISSION),
+        (Section("Split", field_order), Section("Display", ("description",), _DISPLAY_FIELDS), _DATES),
+        (_ANNOUNCEMENT, Section("Quota", (), _QUOTA_FIELDS), _ADMISSION),
     )
 
     def __init__(self, data: Any = None, *, initial: Any = None) -> None:
         super().__init__(data, initial=initial)
         able = Split.objects.filter(same_truth_as=None).exclude(current_edition=None)
         self.fields["truth"].choices = [  # type: ignore[attr-defined]  # a ChoiceField
-            ("hidden", "New, hidden"),
-            ("open", "New, open"),
-            *((f"as {split.pk}", f"Same as {split.title} (a challenge)") for split in able),
+            ("hidden", _choice("New, hidden", f"Teams cannot read the labels. {_IMPORT}")),
+            ("open", _choice("New, open", f"The labels are public. {_IMPORT}")),
+            *((f"as {row.pk}", _choice(f"Same as {row.title}", _CHALLENGE)) for row in able),
         ]
 
     def wanted(self) -> dict[str, Any]:

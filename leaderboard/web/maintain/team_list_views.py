@@ -17,7 +17,7 @@ PER_PAGE = 50
 
 
 class TeamSearch(SiteForm):
-    team = forms.CharField(label="Team, or email address of a person", required=False, max_length=254)
+    team = forms.CharField(label="Team name or email address", required=False, max_length=254)
 
 
 @maintainers_only

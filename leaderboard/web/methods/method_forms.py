@@ -32,13 +32,17 @@ class DetailsForm(DescriptionForm):
 
 
 class MethodForm(DetailsForm):
-    name = forms.CharField(required=False, widget=forms.TextInput(attrs={"maxlength": 80}))
+    name = forms.CharField(
+        required=False,
+        help_text="You can change it until the method is public.",
+        widget=forms.TextInput(attrs={"maxlength": 80}),
+    )
     field_order = ["name"]
 
     @classmethod
     def of_method(cls, request: HttpRequest, *, method: Method) -> "MethodForm":
         form = cls.asked(request, initial=_stated(method))
-        form.fields["description"].widget.attrs["rows"] = 12
+        form.fields["description"].widget.attrs["rows"] = 6
         return form
 
     def changes(self) -> dict[str, object]:

@@ -43,13 +43,13 @@ RECEIPT = receipts.sign(
     {
         "site": "https://leaderboard.example.org",
         "submission": ID,
-        "split": "val",
+        "split": "test",
         "edition": 2,
-        "protocol": OPEN.name,
+        "protocol": "tsttc-1",
         "ground_truth": "sha256:" + "9f" * 32,
         "file": "sha256:" + "1c" * 32,
         "method": {"id": METHOD_ID, "name": "Foo++"},
-        "scores": {name: f"{value:.2f}" for name, value in zip(OPEN.score_names, ON_VAL, strict=True)},
+        "scores": {name: f"{value:.1f}" for name, value in zip(SCORE_NAMES, ON_TEST, strict=True)},
         "counts": COUNTS,
         "scored_at": "2026-11-20T12:00:00Z",
     },
@@ -57,7 +57,7 @@ RECEIPT = receipts.sign(
 )
 
 _BLOCK = re.compile(r"(?<=^```console\n).*?(?=^```$)", re.MULTILINE | re.DOTALL)
-_COMMAND = re.compile(r"^\$ .*(?:\\\n.*)*$", re.MULTILINE)
+_COMMAND = re.compile(r"^\$ .*(?:(?<=\\)\n.*)*$", re.MULTILINE)
 
 
 def recorded(text: str, run: Run) -> str:
@@ -131,7 +131,7 @@ def put_documented_answers(site: RecordedSite) -> None:
     submission: dict[str, Any] = {
         "id": ID,
         "state": "QUEUED",
-        "split": "val",
+        "split": "test",
         "method": "Foo++",
         "visibility": "PRIVATE",
         "method_id": METHOD_ID,
@@ -144,16 +144,16 @@ def put_documented_answers(site: RecordedSite) -> None:
         "problems": [],
         "n_problems": 0,
     }
-    scores = dict(zip(OPEN.score_names, ON_VAL, strict=True))
+    on_test = dict(zip(SCORE_NAMES, ON_TEST, strict=True))
     unranked = {"rank_low": None, "rank_high": None, "is_with_best": None}  # as of every private method
     scored = submission | {
         "state": "SCORED",
         "queue": None,
-        "scores": scores,
+        "scores": on_test,
+        "decimals": 1,
         "intervals": {
-            "mid": {"low": 13.21, "high": 14.60, **unranked},
-            "rte": {"low": 11.18, "high": 12.52, **unranked},
-            "warning": {"low": 2.61, "high": 3.31, **unranked},
+            "mid": {"low": 13.2, "high": 14.6, **unranked},
+            "rte": {"low": 11.1, "high": 12.6, **unranked},
         },
         "awaits_intervals": False,
         "rank": 1,
@@ -176,9 +176,9 @@ def put_documented_answers(site: RecordedSite) -> None:
     running = submission | {"state": "RUNNING", "queue": None}
     site.put(f"GET /api/v1/submissions/{ID}", Reply(submission), Reply(running), Reply(scored))
     site.put(f"GET /api/v1/submissions/{REJECTED_ID}", Reply(rejected))
-    on_test = dict(zip(SCORE_NAMES, ON_TEST, strict=True))
     site.put("GET /api/v1/splits/test/board", Reply(published_board("test", on_test)))
-    site.put("GET /api/v1/splits/val/board", Reply(published_board("val", scores)))
+    on_val = dict(zip(OPEN.score_names, ON_VAL, strict=True))
+    site.put("GET /api/v1/splits/val/board", Reply(published_board("val", on_val)))
     unknown = problem("There is nothing at this address that you may see.", code="not-found")
     site.put("GET /api/v1/splits/trial/board", Reply(unknown, status=404))
 

@@ -293,7 +293,7 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
     page, text = "/maintain/announcement/", "Maintenance <b>today</b>, 8:00 UTC."
     visitor = Client()
     assert text not in visitor.get("/board/test/").text
-    assert "Nothing is announced now." in assert_sound(keeper.get(page)).one("main").text
+    assert "There is no announcement at the moment." in assert_sound(keeper.get(page)).one("main").text
     for sent, sentence in (
         ({"announcement": text}, "The announcement has no end; expected an end beside its text."),
         ({"announcement": text, "announcement_ends_at": "2020-01-01 00:00 UTC"}, "is in the past"),

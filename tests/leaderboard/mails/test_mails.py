@@ -191,7 +191,8 @@ def test_a_maintainer_previews_an_announcement_and_sends_it_once(
 ) -> None:
     assert "Nobody would get this email now." in keeper.get("/maintain/splits/test/mail/").text
     builders.submit(owner, builders.predictions(edition))
-    assert ">1 person</a>: those whose team" in keeper.get("/maintain/splits/test/mail/").text
+    page = keeper.get("/maintain/splits/test/mail/").text
+    assert ">1 person</a>: everyone whose team has submitted to Test" in page
     address, draft = "/maintain/splits/test/mail/", {"subject": "Moved", "text": "First.\r\n\r\nSecond <b>."}
     assert keeper.post(address, {"subject": "", "text": " "}).status_code == 422
     assert keeper.post(address, draft | {"subject": "x" * 151}).status_code == 422

@@ -80,9 +80,11 @@ def test_short_cells_stay_in_one_line_and_long_ones_get_room() -> None:
     assert '<td data-label="b" class="wraps">word word' in drawn, "with its head, for a phone"
 
 
-def test_an_option_of_a_command_does_not_break_at_its_hyphens() -> None:
+def test_an_option_and_a_name_in_code_do_not_break_at_their_hyphens() -> None:
     for text in ("`tsttc check --manifest`", "```sh\ntsttc check --manifest\n```\n"):
         assert '<span class="together">--manifest</span>' in markdown.page(text).html
+    drawn = markdown.page("`looks-like-ratios`, `a/b-c`").html
+    assert drawn.count('<span class="together">') == drawn.count(">looks-like-ratios<") == 1
 
 
 def test_an_equation_of_a_guide_is_mathml_and_one_of_a_maintainer_is_text() -> None:

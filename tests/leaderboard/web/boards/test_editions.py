@@ -191,7 +191,7 @@ def test_changelog_tells_every_change_with_its_reason(client: Client, replaced: 
     assert items == [
         "Rolled back from edition 2 to edition 1. A mistake.",
         "Edition 2 replaced edition 1. Labels corrected.",
-        "Edition 1 was published. The first edition.",
+        "Edition 1, the first edition, was published.",
     ]
 
 

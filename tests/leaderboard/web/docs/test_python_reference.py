@@ -11,7 +11,7 @@ from leaderboard.web.docs import guides, python_reference
 TEXTS = {name: python_reference.text(name) for name in python_reference.SECTIONS}
 TEXT = "\n".join(TEXTS.values())
 GUIDE = guides.files()["python-reference"].read_text(encoding="utf-8")
-ENTRIES = dict(re.findall(r"^### (\S+)\n(.*?)(?=^##|\Z)", TEXT, re.MULTILINE | re.DOTALL))
+ENTRIES = dict(re.findall(r"^### ([\w.]+)(?:\(\))?\n(.*?)(?=^##|\Z)", TEXT, re.MULTILINE | re.DOTALL))
 
 
 def test_every_public_name_is_there_with_words() -> None:
@@ -32,9 +32,15 @@ def test_arguments_are_those_of_the_function() -> None:
     shown = ENTRIES["evaluator.write_predictions"]
     assert re.findall(r"^    (\w+):", shown, re.MULTILINE) == list(signature.parameters)
     assert "    ttc_s: ArrayLike | None = None,\n" in shown
-    assert f"| `DEFAULT_PROTOCOL` | `{DEFAULT_PROTOCOL}` |" in GUIDE
-    assert f"| `N_SIGN_FLIPS`, `PUBLISHED_DECIMALS` | {N_SIGN_FLIPS:,}; {PUBLISHED_DECIMALS} |" in GUIDE
+    assert f"| `DEFAULT_PROTOCOL` | the protocol `{DEFAULT_PROTOCOL}` |" in GUIDE
+    assert f"| `N_SIGN_FLIPS` | {N_SIGN_FLIPS:,} |" in GUIDE
+    assert f"| `PUBLISHED_DECIMALS` | {PUBLISHED_DECIMALS} |" in GUIDE
     assert "timeout_s: float = 15.0,\n    retry_policy: RetryPolicy = …," in ENTRIES["evaluator.Client"]
+
+
+def test_a_function_differs_from_a_class() -> None:
+    assert "### evaluator.evaluate()\n" in TEXT
+    assert "### evaluator.Manifest\n\n```text\nclass Manifest(" in TEXT
 
 
 def test_each_page_has_its_reference_and_all_names_are_linked() -> None:

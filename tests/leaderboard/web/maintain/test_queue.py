@@ -97,7 +97,9 @@ def test_page_says_when_the_last_evaluation_finished_and_whether_a_worker_lives(
     finished_at = Evaluation.objects.get().finished_at
     assert finished_at is not None
     health.record_sweep()
-    assert f"finished at {finished_at:%Y-%m-%d %H:%M} UTC. {seen_lately}" in main_text(keeper, QUEUE)
+    assert f"{seen_lately} The last evaluation finished at {finished_at:%Y-%m-%d %H:%M} UTC." in main_text(
+        keeper, QUEUE
+    )
     assert "No evaluation has finished yet." in main_text(keeper, f"{QUEUE}?split=val")
 
 

@@ -86,7 +86,7 @@ def wrong(client: Client, where: str, data: dict[str, str]) -> list[str]:
 
 def test_every_split_shows_its_rules(keeper: Client, team: Team) -> None:
     root = get(keeper, QUOTAS)
-    assert [row[:3] for row in cells(root, "Rules")] == [
+    assert [row[:3] for row in cells(root, "Per split")] == [
         ["Test", "3 in 30 days, 24 hours apart", "20"],
         ["Validation", "50 in 24 hours", "20"],
         ["Demo", "20 in 24 hours", "20"],
@@ -159,15 +159,15 @@ def test_team_shows_what_it_has_left_on_every_split(
     keeper: Client, team: Team, edition: Edition, owner: User
 ) -> None:
     builders.submit(owner, builders.predictions(edition))
-    test, val, _ = cells(get(keeper, address(team)), f"Quotas of {team.name}")
+    test, val, _ = cells(get(keeper, address(team)), f"Quotas for {team.name}")
     next_at = Submission.objects.get().submitted_at + timedelta(hours=24)
-    assert test[:6] == [
+    assert test[:5] == [
         *("Test", "3 in 30 days, 24 hours apart", f"{next_at:%Y-%m-%d %H:%M} UTC"),
-        *("1", "2", "0 of 20"),
+        *("1 of 3", "0 of 20"),
     ]
-    assert val[:6] == [
-        *("Validation", "50 in 24 hours", "now"),
-        *("0", "50", "0 of 20"),
+    assert val[:5] == [
+        *("Validation", "50 in 24 hours", "not open yet"),
+        *("0 of 50", "0 of 20"),
     ]
 
 

@@ -120,10 +120,10 @@ def test_best_of_the_team_stands_on_top_and_rows_of_the_board_can_be_compared(
     )
     builders.score_all()
     main = pages.page(signed_in.get("/submissions/")).one("main")
-    line = main.one("dl", class_="facts-list")
+    line = main.one("div", class_="intro")
     (value,) = best.evaluations.get().scores.filter(metric="mid", ttc_range="overall").values_list("value")
-    assert line.text.startswith(f"Best on TestMiD {value[0]:.1f} ×10⁻⁴: Mine, would be rank 2 of 7, ")
-    assert line.text.endswith(" behind the best, Foreign one (compare with Foreign one)")
+    assert line.text.startswith(f"Best on Test: Mine, MiD {value[0]:.1f} ×10⁻⁴, would be rank 2 of 7, ")
+    assert line.text.endswith(" behind the best (Foreign one: compare)")
     compare = f"/compare/?split=test&m={best.method_id}&m={theirs.method_id}"
     assert [html.unescape(a.attributes["href"]) for a in line.all("a")] == [
         "/board/test/",

@@ -79,7 +79,7 @@ def test_what_another_submission_of_the_method_surpasses_has_no_rank(
     builders.score_all()
     root = look(signed_in, worse)
     shows = "would show" if visibility == "PRIVATE" else "shows"
-    assert f"Not the best of its method: the board {shows} another submission" in root.one("main").text
+    assert f"Not this method’s best: the board {shows} another submission" in root.one("main").text
     assert "Rank" not in card(root)
     strip = root.one("figure", class_="all-values")
     assert "the tall mark is this submission, which the board does not show" in strip.text
@@ -88,7 +88,7 @@ def test_what_another_submission_of_the_method_surpasses_has_no_rank(
     assert sum(int(n) for n in re.findall(r"\d+", words)) == n_on_board, (
         "the board's one of its method is drawn"
     )
-    assert "Columns of the LaTeX row: rank (none" in root.one("main").text
+    assert "Columns: rank (none" in root.one("main").text
     assert "Rank" in card(look(signed_in, better))
 
 

@@ -117,7 +117,7 @@ def test_the_only_open_split_is_chosen_and_of_closed_ones_stands_the_reason_with
     assert (choice.attributes["value"], "checked" in choice.attributes) == ("test", True)
     closed = root.one("ul", class_="closed-splits")
     assert closed.text.startswith(
-        "Submissions to Validation open once the organisers provide the ground truth."
+        "Submissions to Validation open once the maintainers provide the ground truth."
     )
     assert [a.attributes["href"] for a in closed.all("a")] == ["/board/val/", "/board/demo/"]
 

@@ -126,6 +126,8 @@ def test_page_of_the_best_says_that_the_next_best_replaces_it(
         words in signed_in.get(address(each, "withdraw/")).content.decode() for each in (worse, better)
     ]
     assert answers == [False, True]
+    root = pages.page(signed_in.get(address(worse, "withdraw/")))
+    assert "The current board does not show this submission: no rank on it changes." in root.one("main").text
 
 
 def test_withdrawing_asks_for_the_tick_that_publishing_asks_for(signed_in: Client, sent: Submission) -> None:
