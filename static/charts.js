@@ -39,28 +39,20 @@
     number: () => (value) => String(value).replace("-", "−"),
     texts: (places) => (value) => places.find(([place]) => Math.abs(place - value) < 1e-6)?.[1] ?? "",
     // A name begins below its mark. It moves to the left where it would cross the next step or leave the drawing; where
-    // it would then read as the next mark's it ends below its own, or lies lower. It moves below names that it would
-    // cover, and goes where there is no room for it.
-    below: (nexts, chart) => {
-      let [placed, last] = [[], -1];
-      return ({ dataIndex, rect, labelRect: { width, height } }) => {
-        if (dataIndex <= last) placed = [];
-        last = dataIndex;
+    // it would then read as the next mark's it ends below its own. It goes where there is no room for it,
+    // or where it would lie below the mark before, too.
+    below:
+      (places, chart) =>
+      ({ dataIndex, rect, labelRect: { width, height } }) => {
         const [left, own, bottom] = [rect.x + rect.width / 2, rect.x + rect.width, rect.y + rect.height];
-        const next = nexts[dataIndex] && chart.convertToPixel({ xAxisIndex: 0, yAxisIndex: 0 }, nexts[dataIndex]);
-        let [y, end] = [bottom, next ? next[0] - 6 : chart.getWidth() - 18];
-        if (left + width > end && (!next || Math.abs(next[1] - bottom - height) < height)) {
-          if (!next || own - width >= 40) end = own;
-          else y += height;
-        }
+        const pixels = (place) => place && chart.convertToPixel({ xAxisIndex: 0, yAxisIndex: 0 }, place);
+        const [before, next] = places[dataIndex].map(pixels);
+        let end = next ? next[0] - 6 : chart.getWidth() - 18;
+        if (left + width > end && (!next || Math.abs(next[1] - bottom - height) < height)) end = own;
         const dx = Math.min(0, end - left - width);
-        const [from, to] = [left + dx, left + dx + width];
-        if (from < 40) return { x: -1000 };
-        while (placed.some((other) => other.from < to && from < other.to && Math.abs(other.y - y) <= height)) y += 2;
-        placed.push({ from, to, y });
-        return { hideOverlap: true, dx, dy: y - bottom };
-      };
-    },
+        const isBelowBoth = before && left + dx <= before[0] && bottom - before[1] < 2 * height;
+        return left + dx < 40 || isBelowBoth ? { x: -1000 } : { hideOverlap: true, dx };
+      },
     whisker: (ink) => (_, api) => {
       const [x, low] = api.coord([api.value(0), api.value(1)]);
       const high = api.coord([api.value(0), api.value(2)])[1];

@@ -164,7 +164,7 @@ def quoted_entry(result: PublishedResult, *, rules: Protocol) -> Entry:
         year=result.year,
         paper_url=result.source_url,
         code_url=result.code_url,
-        source=f"{result.authors} ({result.year}). {result.source_title}. {result.source_table}.",
+        source=f"{result.authors} ({result.year}). {result.source_title}, {result.source_table}.",
         source_title=result.source_title,
         details=stated(uses_nerf=result.uses_nerf, latency_ms=result.latency_ms, hardware=result.hardware),
         shown_at=result.added_at if result.added_at > SINCE_EVER else None,

@@ -32,7 +32,7 @@ def changed_rows(board: Board) -> list[ChangedRow]:
         ChangedRow(
             entry=change.entry,
             is_new=change.before is None,
-            words=_words(change),
+            words=_words(change, symbol=edition.rules.primary.symbol),
             rank=_then_now(change, lambda entry: str(entry.rank or ABSENT)),
             value=_then_now(
                 change, lambda entry: format_rounded(entry.scores.get(name), decimals=entry.decimals)
@@ -42,7 +42,7 @@ def changed_rows(board: Board) -> list[ChangedRow]:
     ]
 
 
-def _words(change: Change) -> str:
+def _words(change: Change, *, symbol: str) -> str:
     before, after = change.before, change.after
     if after is None:
         return "removed"
@@ -50,12 +50,13 @@ def _words(change: Change) -> str:
         return "withdrawn"
     if before is None:
         return ""
+    words = []
+    if before.rank and after.rank and before.rank != after.rank:
+        n_down = after.rank - before.rank
+        words.append(f"down {n_down}" if n_down > 0 else f"up {-n_down}")
     if before.value != after.value:
-        return "another value"
-    if before.rank is None or after.rank is None:
-        return "another rank"
-    n_down = after.rank - before.rank
-    return f"down {n_down}" if n_down > 0 else f"up {-n_down}"
+        words.append(f"{symbol} changed")
+    return ", ".join(words)
 
 
 def _then_now(change: Change, text: Callable[[Entry], str]) -> str:

@@ -57,7 +57,8 @@ def named_marks(name: str, front: Sequence[Mark], chosen: Iterable[int], look: L
     for item, after in itertools.pairwise(items):
         if item["name"] == after["name"]:  # a method that improves on itself is named at its best
             item["label"] = {"show": False}
-    nexts = [[front[i + 1].x, front[i + 1].y] if i + 1 < len(front) else None for i in indices]
+    places = [None, *([mark.x, mark.y] for mark in front), None]
+    beside = [[places[i], places[i + 2]] for i in indices]
     series = marks(name, (), look, z=4)
     label = {
         **TEXT,
@@ -69,7 +70,7 @@ def named_marks(name: str, front: Sequence[Mark], chosen: Iterable[int], look: L
         "textBorderColor": "--ground",
         "textBorderWidth": 6,  # wide enough to hide a grid line between two words
     }
-    return series | {"data": items, "label": label, "labelLayout": call("below", nexts)}
+    return series | {"data": items, "label": label, "labelLayout": call("below", beside)}
 
 
 def staircase(name: str, corners: Iterable[tuple[float, float]]) -> Option:

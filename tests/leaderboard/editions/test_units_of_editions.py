@@ -162,7 +162,7 @@ def test_pages_answers_and_exports_say_which_unit_it_is(client: Client, tmp_path
     assert "95% confidence interval (bootstrap over 32 days)" in words("/board/test/")
     assert "32 days: treated as independent in confidence intervals" in words("/board/test/editions/1/")
     method = words(f"/methods/{sent[0].method_id}/").replace("\xa0", " ")
-    assert "Intervals and rank ranges: 95% confidence, over 32 days." in method
+    assert "95% confidence intervals and rank ranges, computed from 32 days." in method
     pair = [str(each.method_id) for each in sent[:2]]
     sentence = "resampling whole days (32 days), because recordings from one day resemble each other."
     assert sentence in words("/compare/", split="test", m=pair)

@@ -115,7 +115,7 @@ def test_anonymous_row_changes_the_time_of_the_board_by_its_day(
 
 def test_chart_below_the_board_holds_for_any_filter(client: Client, benchmark: None) -> None:
     section = get(client, "/board/test/?q=nerf").one("section", class_="board-progress")
-    assert "All rows of the board" in section.text
+    assert "All methods on the board" in section.text
     assert "Pixel MSE" in section.text
 
 
@@ -155,7 +155,7 @@ def test_my_teams_rows_are_marked_and_its_private_ones_stand_on_its_own_board_al
         root = get(client)
         seen[user.name] = (
             "mine" in row_of(root, "Foo").classes,
-            "private" in root.one("table", class_="board").one("tbody").text,
+            "private, would be rank" in root.one("table", class_="board").one("tbody").text,
         )
         assert ("6 results and 1 private" in root.one("main").text) == (user != stranger)
         assert row_of(root, "Foo").one("circle", class_="ring").attributes == ring, "on the public scale"

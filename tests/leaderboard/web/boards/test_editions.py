@@ -115,6 +115,8 @@ def test_past_board_lists_what_has_changed_since(
     file = builders.predictions(entries[0].evaluations.get().edition, factor=1.01)
     builders.submit(owner, file, method="New")
     passing = builders.submit(owner, file, method="Passing")
+    better = builders.predictions(entries[0].evaluations.get().edition, factor=1.02)
+    builders.submit(owner, better, method="M1.05")
     builders.score_all()
     for submission in (entries[1], passing):
         intake.withdraw(submission=submission, actor=owner, now=now)
@@ -123,7 +125,7 @@ def test_past_board_lists_what_has_changed_since(
     changed = [
         (row.one("th").text, *(cell.text for cell in row.all("td"))) for row in section.one("tbody").all("tr")
     ]
-    assert changed[0][:3] == ("M1.05", "down 1", "1 → 2")
+    assert changed[0][:3] == ("M1.05", "down 1, MiD changed", "1 → 2")
     assert [item.text for item in section.one("ul").all("li")] == ["1 New"]
     assert changed[-1][:2] == ("M1.1", "withdrawn")
     assert changed[-1][2].endswith(" → –")

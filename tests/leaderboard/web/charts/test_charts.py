@@ -115,6 +115,7 @@ def test_a_progress_has_three_dates_and_else_errors_by_range_are_drawn(
         return [(figure.attributes["data-chart"], bool(figure.all("table"))) for figure in figures]
 
     assert below("/board/test/") == [("profile", True)]
+    assert "Charts not shown yet" in get(client, "/board/val/charts/").one("main").text
     assert ("progress", True) not in below("/board/test/charts/")
     assert client.get("/board/test/charts/progress.json").json() == {}
     spread(entries)

@@ -91,7 +91,7 @@ def test_private_method_is_marked_for_its_team(
     Method.objects.update(visibility=Visibility.PRIVATE)
     for member in (owner, teammate):
         client.force_login(member)
-        assert "only your team and the maintainers see this page" in get(client, method).one("main").text
+        assert "only your team and the maintainers can see this page" in get(client, method).one("main").text
 
 
 def test_details_are_chips_and_a_row_of_the_board_shows_the_first_of_them(
