@@ -61,7 +61,7 @@ ABLATIONS: Final[tuple[Ablation, ...]] = (
     ),
     Ablation(
         name="shift",
-        title="Greatest shift of the centre",
+        title="Maximum shift of the centre",
         settings=(0, 1, 2, 3, 4),
         default=3,
         parameter="shift",

@@ -134,7 +134,7 @@ METHODS: Final[tuple[Method, ...]] = (
                 choices=("paper", "toolkit"),
             ),
             Parameter("bins", 125, "Scale ratios that are tried.", kind=int, low=2, high=400),
-            Parameter("shift", 3, "Greatest shift of a patch, in its cells.", kind=int, low=0, high=16),
+            Parameter("shift", 3, "Maximum shift of a patch, in its cells.", kind=int, low=0, high=16),
             Parameter("top", 3, "Best scale ratios that are averaged.", kind=int, low=1, high=400),
             Parameter("expand", 1.1, "Enlargement of the boxes.", kind=float, low=0.5, high=2.0),
             Parameter(

@@ -31,7 +31,7 @@ _TITLES: Final = {
 _SETTINGS: Final = {
     "n_scale_bins": "Bins",
     "frame_gap": "Frame gap",
-    "center_shift": "Greatest shift",
+    "center_shift": "Maximum shift",
     "n_nerf_sequences": "Sequences",
     "plates_blurred": "Plates",
     "target_size_px": "Size in px",
@@ -54,7 +54,8 @@ _LABELS: Final = {
     "script": "Script",
     TIME: "Time in ms",
 }
-_FIRST_HEADINGS: Final = {"camera-specification": "Camera", "nerf-scripts": "No.", "dataset-comparison": ""}
+_FIRST_HEADINGS: Final = {"nerf-scripts": "No."}
+_CAMERAS: Final = "camera-specification"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +81,10 @@ class PrintedTable:
     @property
     def caption(self) -> str:
         return f"{self.table.caption.rstrip('.')}."
+
+    @property
+    def section(self) -> str:
+        return f"Section {', '.join(self.table.section.split(' ', 1))}"
 
     @property
     def units(self) -> str:
@@ -134,7 +139,7 @@ def _heading(table: PublishedTable, column: str) -> str:
     if column in SCORE_NAMES:
         metric, (_, ttc_range) = metric_of(column), split_name(column)
         return metric.symbol if ttc_range == OVERALL else f"{metric.symbol} {ttc_range}"
-    return _LABELS.get(column, column)
+    return f"Camera {column}" if table.name == _CAMERAS else _LABELS.get(column, column)
 
 
 def _values(row: PublishedRow) -> Iterator[str]:
@@ -160,7 +165,7 @@ def _value_text(value: Any) -> str:
 
 
 def _list_text(values: list[Any]) -> str:
-    texts = [_value_text(each) for each in values]
+    texts = [_value_text(each).replace("'", "’") for each in values]
     if isinstance(values[0], str):
         return " ".join(f"{text.rstrip('.')}." for text in texts)
     return (" to " if len(values) == 2 and values[0] <= 0 else ", ").join(texts)

@@ -140,8 +140,8 @@ def selection(n_tried: Mapping[str, int]) -> str:
 
     >>> print(selection({"A": 3, "B": 1, "C": 10}))
     A is the best of 3 scored submissions, C of 10. Picking the best of several equally good submissions \
-makes a method look better by chance: by about 0.60 standard errors of a difference for the best of 3, and \
-1.09 for the best of 10.
+makes a method look better by chance: by about 0.60 standard errors of the difference if the best of 3 is \
+picked, and 1.09 if the best of 10.
     """
     chosen = {name: n for name, n in n_tried.items() if n > 1}
     if not chosen:
@@ -151,8 +151,8 @@ makes a method look better by chance: by about 0.60 standard errors of a differe
         [f"{name} is the best of {n:,} scored submissions", *(f"{each} of {m:,}" for each, m in rest)]
     )
     first, *others = sorted(set(chosen.values()))
-    amounts = [f"{best_of(first):.2f} standard errors of a difference for the best of {first:,}"]
-    amounts += [f"{best_of(each):.2f} for the best of {each:,}" for each in others]
+    amounts = [f"{best_of(first):.2f} standard errors of the difference if the best of {first:,} is picked"]
+    amounts += [f"{best_of(each):.2f} if the best of {each:,}" for each in others]
     listed = ", and ".join([", ".join(amounts[:-1]), amounts[-1]] if others else amounts)
     return (
         f"{who}. Picking the best of several equally good submissions makes a method look better by chance: "

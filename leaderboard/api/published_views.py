@@ -57,7 +57,7 @@ class PublishedTablesView(APIView):
 
     @extend_schema(operation_id="list_published_tables", responses=PublishedTableSerializer(many=True))
     def get(self, request: Request) -> Response:
-        """Main results, ablations, cameras and scripts, with the values that the paper prints."""
+        """Main results, ablations, cameras and scripts, with the values as printed in the paper."""
         tables = published.printed_tables() if settings.BENCHMARK.has_paper_tables else ()
         documents = [published.document(shown) for shown in tables]
         return Response(PublishedTableSerializer(documents, many=True).data)  # type: ignore[arg-type]  # many rows, as it says

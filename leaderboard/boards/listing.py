@@ -55,7 +55,7 @@ class UnknownColumn(ValueError):
 
     def __init__(self, column: str, *, known: Sequence[str]) -> None:
         self.on_page = (
-            f"This board has no column “{column[:60]}” to sort by. It is sorted by rank. "
+            f"This board has no “{column[:60]}” column, so it is sorted by rank. "
             "Select a column heading to sort."
         )
         super().__init__(

@@ -32,6 +32,9 @@ from leaderboard.web.charts.chart_series import SERIES_INKS, SERIES_SYMBOLS, Loo
 
 _MIN_SETTINGS: Final = 3
 """Two settings are read faster in the table."""
+_HOLLOW: Final = "Hollow: the paper’s default."
+_NEAR: Final = "Axes do not start at 0."
+"""Of straight axes: a logarithmic one has no 0."""
 
 
 def sweep(shown: PrintedTable) -> Chart:
@@ -82,6 +85,7 @@ def sweep(shown: PrintedTable) -> Chart:
         options=frame.options(),
         columns=shown.headings,
         rows=tuple(row.cells for row in shown.rows),
+        note=_HOLLOW if any(axis["type"] == "log" for axis in frame.y_axes) else f"{_HOLLOW} {_NEAR}",
     )
 
 

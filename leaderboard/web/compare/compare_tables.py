@@ -36,14 +36,13 @@ def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, 
         {each.method: n_tried.get(each.method_id, 0) for each in compared.entries if each.method_id}
     )
     matrix = difference_matrix(compared)
-    significant = significant_pairs(compared) if matrix else []
     return {
         "compared": compared,
         "title": f"{_NUMBERS[len(names)].capitalize()} methods compared",
         "verdict": with_bold_names(verdict(compared), names),
         "matrix": matrix,
         "metric": metric_of(compared.entries[0].primary),
-        "pairs": [_pair_table(pair, is_significant=pair in significant) for pair in compared.pairs],
+        "pairs": list(map(_pair_table, compared.pairs)),
         "profile": profile_chart.profile(compared.entries),
         "selection": with_bold_names(chosen, names),
     }
@@ -75,7 +74,7 @@ def verdict(compared: Compared) -> str:
         for relation, names in relations
         if names
     ]
-    together = f" (all {len(tested)} pairs tested together)" if len(tested) > 1 else ""
+    together = f" (corrected for all {len(tested)} pairs)" if len(tested) > 1 else ""
     lines = [head, f"It is {', and '.join(parts)}{together}."] if parts else [head]
     return " ".join([*lines, *dict.fromkeys(pair.withheld for pair in compared.pairs if pair.withheld)])
 
@@ -94,13 +93,12 @@ def _rivals(best: Entry, pairs: Sequence[Pair]) -> list[str]:
     return [(pair.second if pair.first == best else pair.first).method for pair in pairs]
 
 
-def _pair_table(pair: Pair, *, is_significant: bool) -> dict[str, Any]:
+def _pair_table(pair: Pair) -> dict[str, Any]:
     differences = pair.differences or {}
     columns = pair.first.scores
     names = (pair.first.method, pair.second.method)
     return {
         "pair": pair,
-        **_gap(pair, is_significant=is_significant),
         "sentence": with_bold_names(pair.sentence(), names),
         "others": pair.others(),
         "influence": with_bold_names(pair.influence(), names),
@@ -111,19 +109,6 @@ def _pair_table(pair: Pair, *, is_significant: bool) -> dict[str, Any]:
         if differences
         else [],
         "has_intervals": any(difference.low is not None for difference in differences.values()),
-    }
-
-
-def _gap(pair: Pair, *, is_significant: bool) -> dict[str, str]:
-    """Word the difference in the score that ranks as the matrix does, with a star where significant."""
-    if pair.difference is None:
-        return {}
-    gap = pair.difference.difference
-    css = ("better" if gap < 0 else "worse") if is_significant else "quiet"
-    symbol = metric_of(pair.first.primary).symbol
-    return {
-        "gap": f"{symbol} {signed(gap, decimals=pair.first.decimals)}{'*' * is_significant}",
-        "gap_css": css,
     }
 
 

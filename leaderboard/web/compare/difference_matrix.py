@@ -124,7 +124,7 @@ def _forest(
     start = -svg.scale_end(below) if below else 0.0
     if not to_best:
         return (), SafeString("")
-    origin = ForestRow(best, svg.difference(end, 0.0, None, None, start=start), "0", "")
+    origin = ForestRow(best, svg.difference(end, 0.0, None, None, start=start), "best", "")
     rows = tuple(
         ForestRow(
             entry=entry,

@@ -75,6 +75,7 @@ def test_csv_has_numbers_with_method_and_setting() -> None:
         "rte": "29.9",
     }
     cameras = list(csv.reader(io.StringIO(as_csv(printed(table("camera-specification"))))))
+    assert cameras[0] == ["name", "Camera 1", "Camera 3", "Camera 4", "Camera 8", "Camera 9"]
     assert cameras[1] == ["Half of the field of view", "±63.2°", "±40.4°", "±18.4°", "±63.2°", "±63.2°"]
 
 

@@ -110,7 +110,7 @@ def test_a_further_range_and_a_third_metric_stand_wherever_their_edition_is_show
     assert "Absolute TTC error (AE) s" in page_text(client, "/board/test/?columns=absolute")
     assert "AE" in page_text(client, "/board/test/?sort=-absolute_far&columns=absolute")
     unsorted = page_text(client, "/board/test/editions/1/?sort=absolute", 400)
-    assert "This board has no column “absolute” to sort by." in unsorted
+    assert "This board has no “absolute” column, so it is sorted by rank." in unsorted
 
     # Comparison and charts.
     ids = [row["method_id"] for row in scored[:2]]

@@ -164,7 +164,7 @@ def test_pages_answers_and_exports_say_which_unit_it_is(client: Client, tmp_path
     method = words(f"/methods/{sent[0].method_id}/").replace("\xa0", " ")
     assert "95% confidence intervals and rank ranges, computed from 32 days." in method
     pair = [str(each.method_id) for each in sent[:2]]
-    sentence = "resampling whole days (32 days), because recordings from one day resemble each other."
+    sentence = "sign-flip test of whole days (32 days), because recordings from one day resemble each other."
     assert sentence in words("/compare/", split="test", m=pair)
     for address, query in (
         ("/api/v1/splits/test/board", {}),

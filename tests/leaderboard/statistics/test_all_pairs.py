@@ -47,13 +47,13 @@ def compared(
 @pytest.mark.parametrize(
     ("p_of_b", "p_of_c", "ending"),
     [
-        (0.001, 0.001, "It is significantly better than the other two (all 3 pairs tested together)."),
-        (0.4, 0.4, "It is not significantly better than the other two (all 3 pairs tested together)."),
+        (0.001, 0.001, "It is significantly better than the other two (corrected for all 3 pairs)."),
+        (0.4, 0.4, "It is not significantly better than the other two (corrected for all 3 pairs)."),
         (
             0.4,
             0.001,
             "It is significantly better than C, and not significantly better than B "
-            "(all 3 pairs tested together).",
+            "(corrected for all 3 pairs).",
         ),
     ],
 )
@@ -73,12 +73,12 @@ def test_a_class_of_p_counts_as_its_upper_end() -> None:
     """On a hidden split p < 0.01 is all that is known: enough for three methods, not for four."""
     three = compared(None, None, None, below=(0.01, 0.01, 1.0))
     assert (
-        "It is significantly better than the other two (all 3 pairs tested together)."
+        "It is significantly better than the other two (corrected for all 3 pairs)."
         in compare_tables.verdict(three)
     )
     four = compared(*[None] * 6, entries=(A, B, C, replace(C, method="D")), below=(0.01, 0.01, 0.01, 1, 1, 1))
     assert (
-        "It is not significantly better than the other three (all 6 pairs tested together)."
+        "It is not significantly better than the other three (corrected for all 6 pairs)."
         in compare_tables.verdict(four)
     )
 
@@ -87,8 +87,7 @@ def test_no_method_is_called_worse_that_the_board_marks_as_possibly_best() -> No
     entries = with_range(A, 1, 2), with_range(B, 1, 3), with_range(C, 2, 3)
     sentence = compare_tables.verdict(compared(0.001, 0.001, 0.5, entries=entries))
     assert sentence.endswith(
-        "It is significantly better than C, and not significantly better than B "
-        "(all 3 pairs tested together)."
+        "It is significantly better than C, and not significantly better than B (corrected for all 3 pairs)."
     )
 
 
@@ -96,7 +95,7 @@ def test_methods_with_separate_rank_ranges_on_the_board_are_separate() -> None:
     """The ranges of a board hold all at once: A is before B and C wherever their true ranks lie in them."""
     entries = with_range(A, 1, 1), with_range(B, 2, 3), with_range(C, 2, 3)
     sentence = compare_tables.verdict(compared(0.04, 0.04, 0.5, entries=entries))
-    assert sentence.endswith("It is significantly better than the other two (all 3 pairs tested together).")
+    assert sentence.endswith("It is significantly better than the other two (corrected for all 3 pairs).")
 
 
 @pytest.mark.slow

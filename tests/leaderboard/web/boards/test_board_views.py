@@ -138,7 +138,7 @@ def test_filters_that_nothing_fits_leave_a_sentence_and_a_way_back(
         ("columns=all", "This address asks for unknown columns, “all”. The board shows all columns."),
         ("page=0", "The board has no page '0'; expected a number from 1 on."),
         ("page=٣", "expected a number from 1 on"),
-        ("sort=<script>", "This board has no column “<script>” to sort by. It is sorted by rank."),
+        ("sort=<script>", "This board has no “<script>” column, so it is sorted by rank."),
         ("at=2026-13-40", "is not a date or a time"),
         ("frames=9", "The filter 'frames' is '9'; expected one of 2, 3, 4, 5, 6."),
     ],

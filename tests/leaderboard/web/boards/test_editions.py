@@ -230,7 +230,7 @@ def test_withdrawn_entry_leaves_its_mark_in_a_former_edition(
     assert {cell.text for cell in row.all("td")} - {""} == {"–"}
     notices = [each.text for each in root.all("p", class_="notice")]
     assert (
-        "1 submission was withdrawn by its team: its row stays without scores and rank in every edition."
+        "One submission was withdrawn by its team. Its row remains in every edition, without scores or rank."
         in notices
     )
 

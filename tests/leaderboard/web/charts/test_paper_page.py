@@ -57,6 +57,8 @@ def test_sweeps_have_a_chart_with_every_number_of_their_table() -> None:
     assert sorted(drawn) == sorted(value for row in rows for value in row.values)
     lines = [mark["read"] for each in gap if each["type"] == "scatter" for mark in each["data"]]
     assert ["MiD 41.0", "the paper's default"] in lines
+    assert "Axes" not in charts["ablation-frame-gap"].note, "its axes are logarithmic"
+    assert charts["ablation-kernel-size"].note.endswith("Axes do not start at 0.")
     for axis in charts["ablation-kernel-size"].options["baseOption"]["yAxis"]:
         assert axis["max"] < 2 * axis["min"], "from near the values: from 0 the lines are level"
 

@@ -80,7 +80,7 @@ def test_five_methods_are_one_verdict_a_matrix_and_ten_closed_pairs(
     assert len(root.all("section", class_="pair")) == 10
     assert root.one("p", class_="verdict").text.startswith("Of these five, M0 has the lowest MiD, ")
     assert root.one("p", class_="verdict").text.endswith(
-        "It is significantly better than the other four (all 10 pairs tested together)."
+        "It is significantly better than the other four (corrected for all 10 pairs)."
     )
     assert all(len(pair.all("p", class_="others")) == 1 for pair in root.all("section", class_="pair"))
     assert all("open" not in each.attributes for each in root.one("div", id="comparison").all("details"))
@@ -191,7 +191,7 @@ def test_what_was_chosen_of_several_submissions_is_shown_and_what_that_is_worth(
     ids = [entries[0].method_id, entries[1].method_id]
     get(client, *ids)
     builders.infer_all()
-    assert get(client, *ids).all("p", class_="selection") == [], "one submission each: nothing was chosen"
+    assert get(client, *ids).all("dd", class_="selection") == [], "one submission each: nothing was chosen"
     name = entries[0].method.name
     for factor in (1.8, 1.9):
         builders.submit(owner, builders.predictions(edition, factor=factor), method=name)
@@ -199,10 +199,10 @@ def test_what_was_chosen_of_several_submissions_is_shown_and_what_that_is_worth(
     builders.infer_all()
     sentence = (
         f"{name} is the best of 3 scored submissions. Picking the best of several equally good submissions "
-        "makes a method look better by chance: by about 0.60 standard errors of a difference for the best of "
-        "3."
+        "makes a method look better by chance: by about 0.60 standard errors of the difference if the best "
+        "of 3 is picked."
     )
-    assert get(client, *ids).one("p", class_="selection").text == sentence
+    assert get(client, *ids).one("dd", class_="selection").text == sentence
     method_page = pages.page(client.get(f"/methods/{ids[0]}/"))
     assert method_page.one("p", class_="selection").text == sentence
     other = pages.page(client.get(f"/methods/{ids[1]}/"))
