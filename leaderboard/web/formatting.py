@@ -123,6 +123,12 @@ def breakable(path: str) -> SafeString:
     return format_html("{}{}", format_html_join("", "{}/<wbr>", ((part,) for part in folders)), last)
 
 
+def lined(text: str) -> SafeString:
+    """Let each line of an output be indented where it goes on, and break after a slash, as HTML."""
+    lines = ((breakable(line),) for line in text.splitlines())
+    return format_html_join("", '<span class="line">{}\n</span>', lines)
+
+
 def day(at: datetime) -> SafeString:
     """Format the day, with time and zone on hover."""
     return _time(at, "%Y-%m-%d")
