@@ -124,9 +124,8 @@ def breakable(path: str) -> SafeString:
 
 
 def lined(text: str) -> SafeString:
-    """Let each line of an output be indented where it goes on, and break after a slash, as HTML."""
-    lines = ((breakable(line),) for line in text.splitlines())
-    return format_html_join("", '<span class="line">{}\n</span>', lines)
+    """Let each line of an output be indented where it goes on, as HTML."""
+    return format_html_join("", '<span class="line">{}\n</span>', ((line,) for line in text.splitlines()))
 
 
 def day(at: datetime) -> SafeString:
