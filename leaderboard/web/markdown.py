@@ -212,7 +212,7 @@ def _shape(cell: Token, inline: Token) -> None:
     if "right" in str(cell.attrs.pop("style", "")):
         cell.attrJoin("class", "number")
     words = _plain(inline)
-    if cell.tag == "td" and (len(words) <= _MAX_TOGETHER or "±" in words):
+    if cell.tag == "td" and (len(words) <= _MAX_TOGETHER or " ± " in words):
         for child in inline.children or ():
             child.content = child.content.replace(" ", "\N{NO-BREAK SPACE}")
     elif cell.tag == "td" and len(words) > _MIN_WRAPS:
