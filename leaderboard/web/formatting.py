@@ -124,7 +124,7 @@ def breakable(path: str) -> SafeString:
 
 
 def lined(text: str) -> SafeString:
-    """Let each line of an output be indented where it goes on, as HTML."""
+    """Let each line of an output be indented where it continues, as HTML."""
     return format_html_join("", '<span class="line">{}\n</span>', ((line,) for line in text.splitlines()))
 
 
