@@ -23,10 +23,10 @@ _MAX_TOGETHER: Final = 14
 _MIN_WRAPS: Final = 40
 # An option or a name in code, which a browser would break at its hyphens.
 _CODE: Final = re.compile(r"<code\b.*?</code>", re.DOTALL)
-# A long name or path, in code or as a heading, which breaks at its dots, slashes and underscores.
+# A long name or path, in code or as a heading, which breaks at its dots, slashes and underscores; an ending stays.
 _NAMES: Final = re.compile(r"(?<=<code>)[^<]+(?=</code>)|(?<=>)[^<]+(?=</h3>)")
 _LONG: Final = re.compile(r"\S{24,}")
-_JOINT: Final = re.compile(r"(?<=[\w}][./_])(?=[\w{])")
+_JOINT: Final = re.compile(r"(?<=[\w}][/_])(?=[\w{])|(?<=\w\.)(?=\w{5})")
 _HYPHENED: Final = re.compile(r"(?<=[\s>\[])(?:--?[a-z]|[A-Za-z]+-)[\w-]*")
 _TABLE: Final = re.compile(r"<table>\n(.*?)</table>", re.DOTALL)
 

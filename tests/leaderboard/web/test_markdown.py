@@ -91,7 +91,7 @@ def test_a_long_name_breaks_at_its_dots_slashes_and_underscores_alone() -> None:
     drawn = markdown.page(
         "`/api/v1/methods/{id}/my_file.json`, `a.short_name`\n\n### tsttc_baselines.read_folder()"
     )
-    assert "/api/<wbr>v1/<wbr>methods/<wbr>{id}/<wbr>my_<wbr>file.<wbr>json<" in drawn.html
+    assert "/api/<wbr>v1/<wbr>methods/<wbr>{id}/<wbr>my_<wbr>file.json<" in drawn.html
     assert ">a.short_name<" in drawn.html
     assert ">tsttc_<wbr>baselines.<wbr>read_<wbr>folder()<" in drawn.html
 
