@@ -23,7 +23,7 @@ _MAX_TOGETHER: Final = 14
 _MIN_WRAPS: Final = 40
 # An option or a name in code, which a browser would break at its hyphens.
 _CODE: Final = re.compile(r"<code\b.*?</code>", re.DOTALL)
-# A long name or path, in code or as a heading, which breaks at its dots, slashes and underscores; an ending stays.
+# A long name or path, in code or a heading: it breaks at dots, slashes and underscores, not before an ending.
 _NAMES: Final = re.compile(r"(?<=<code>)[^<]+(?=</code>)|(?<=>)[^<]+(?=</h3>)")
 _LONG: Final = re.compile(r"\S{24,}")
 _JOINT: Final = re.compile(r"(?<=[\w}][/_])(?=[\w{])|(?<=\w\.)(?=\w{5})")
