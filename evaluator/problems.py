@@ -64,7 +64,7 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "no-overlap": "A correction has no sequence of the ground truth that it is to correct.",
     "bad-digest": "The content of a saved file does not match the digest stored in it.",
     "forbidden-pickle": "A pickle asks for something other than plain containers, numbers and arrays.",
-    "bad-annotations": "An annotation file has another structure than the toolkit's.",
+    "bad-annotations": "An annotation file is not structured like the toolkit's.",
 }
 """Every code with what it means."""
 
@@ -98,7 +98,7 @@ WARNING_CODES: Final[dict[str, str]] = {
     "looks-like-ratios": "Nearly all values lie between 0.5 and 1.5: probably scale ratios without a unit.",
     "flipped-signs": "Values of one object rise while time passes: probably every sign is wrong.",
     "shuffled-values": "Values of one object differ as much as those of several: probably wrong keys.",
-    "unlike-truth": "The predictions do not go with the true times, or have the opposite sign.",
+    "unlike-truth": "The predictions do not match the true times, or have the opposite sign.",
     "other-numbering": "The toolkit numbers the sequences of a folder differently on this machine.",
 }
 """Every code of a warning with what it means."""

@@ -79,7 +79,7 @@ class ScoreMetric(Metric):  # type: ignore[misc]  # of an extra, which mypy skip
     def update(
         self, rows: Any, ttc_s: Any = None, *, scale_ratio: Any = None, frame_gap: int | None = None
     ) -> None:
-        """Take the predictions of a batch: (b,) rows of the ground truth, and seconds or scale ratios.
+        """Take the predictions of a batch: rows of the ground truth, and their seconds or scale ratios.
 
         Tensors may have any precision, device and a gradient. What no file may hold is no value. Raises
         `ValueError` for other shapes, rows that are not expected, and arguments that do not fit together.

@@ -246,7 +246,7 @@ class Refused(ClientError):
 
 @dataclass(kw_only=True, eq=False)
 class BadAnswer(ClientError):
-    """An answer that is not a leaderboard's: not JSON, of another shape, or a redirect."""
+    """A response that did not come from a leaderboard: not JSON, of another shape, or a redirect."""
 
     # Following a redirect could send the token to another server.
 

@@ -34,7 +34,7 @@ from evaluator.truth.ground_truth import Manifest
 class Predictions:
     """One value per sequence of the manifest.
 
-    `ttc_s` is float64 (n,), read-only, in the manifest's order: seconds from the target frame, not truncated.
+    `ttc_s` is a read-only array `(n,)` in the manifest's order: seconds from the target frame, not truncated.
     `digest` is "sha256:" and the hex SHA-256 of the file's bytes. `names` are the file's keys by row, if it
     was written for another manifest.
     """
@@ -63,7 +63,7 @@ class Predictions:
         frame_gap: int | None = None,
         digest: str | None = None,
     ) -> Predictions:
-        """Make predictions from arrays (n,) in the manifest's order.
+        """Make predictions from arrays `(n,)` in the manifest's order.
 
         Give `ttc_s` (seconds), or `scale_ratio` with `fps_hz` or `frame_gap`. The default `digest` is that of
         the seconds as little-endian float64. Raises `ValueError` for a wrong shape, order or combination of

@@ -34,10 +34,10 @@ def write_predictions(
 ) -> bytes:
     """Write a valid prediction file; returns its bytes, and writes them to `path` or an open file if given.
 
-    Give `ttc_s` (seconds), or `scale_ratio` with `fps_hz` or `frame_gap`, (n,); and `manifest`, whose order
-    the values have, or their `keys`. Every float64 reads back exactly. Seconds without `meta` use the flat
-    form, others the envelope. Raises `ValueError` for a wrong combination of arguments, `Rejected` for values
-    that no file may hold.
+    The values are an array `(n,)`: `ttc_s` in seconds, or `scale_ratio` with `fps_hz` or `frame_gap`. They
+    have the order of `manifest`, or of `keys` if you have no manifest. Every float64 reads back exactly.
+    Seconds without `meta` are written in the flat form, anything else as an envelope. Raises `ValueError` for
+    a wrong combination of arguments, `Rejected` for values that no file may hold.
     """
     values = _values(ttc_s, scale_ratio, manifest)
     names = _names(manifest, keys, n_values=len(values))

@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 class Report:
     """Means per TTC range, counts, and the number of predictions truncated to each boundary.
 
-    `scores` follow the protocol's `range_names`: overall, crucial, …. Only on request: `sequences` (by metric
-    the errors, float64 (n,), in the manifest's order), `details` and `bags`; these are never part of the
-    JSON. `by`, `frame` and `plot` need `keep_sequences=True`.
+    `scores` follow the protocol's `range_names`: overall, crucial, …. `sequences` (by metric, the errors of
+    every sequence in the manifest's order), `details` and `bags` are there on request only, and never part of
+    the JSON. `by`, `frame` and `plot` need `keep_sequences=True`.
     """
 
     # For a hidden split, `sequences`, `details` and `bags` never leave the worker.

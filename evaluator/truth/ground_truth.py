@@ -34,7 +34,7 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Manifest:
-    """The public description of a split's sequences, in file order. Arrays are (n,), read-only.
+    """The public description of a split's sequences, in file order. Arrays are `(n,)`, read-only.
 
     `unit` is empty unless the ground truth names a unit for every recording.
     """
@@ -194,7 +194,7 @@ class Manifest:
 
 @dataclass(frozen=True, eq=False)
 class GroundTruth:
-    """One revision of the hidden values: the manifest, and τ in seconds, float64 (n,), read-only.
+    """One revision of the hidden values: the manifest, and τ in seconds, a read-only array `(n,)`.
 
     `objects` are further annotations, outside of the digest and of `save`.
     """
@@ -249,7 +249,7 @@ class GroundTruth:
         return self.n_sequences - int(np.count_nonzero(np.logical_or.reduce(inside)))
 
     def subset(self, rows: ArrayLike) -> GroundTruth:
-        """The ground truth of some sequences, such as a fold: a mask (n,) of bools, or rows in any order.
+        """Return some sequences, such as a fold: `rows` is a mask `(n,)` of bools, or rows in any order.
 
         They keep their anno_ids; predictions of the whole are scored as `predictions.subset(rows)`. Raises
         `IndexError` for rows that are not there, `Rejected` for none and for a row that comes twice.

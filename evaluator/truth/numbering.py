@@ -21,7 +21,7 @@ from evaluator.truth.ground_truth import Manifest
 
 @dataclass(frozen=True, eq=False)
 class Numbering:
-    """A manifest, and for each anno_id of the toolkit, 0 to n - 1, the manifest's row: (n,)."""
+    """A manifest, and `rows`: for each anno_id of the toolkit, from 0 up, the row of the manifest."""
 
     manifest: Manifest
     rows: NDArray[np.intp]
@@ -38,7 +38,7 @@ class Numbering:
         return {str(anno_id): keys[row] for anno_id, row in enumerate(self.rows.tolist())}
 
     def realigned(self, ttc_s: Floats) -> Floats:
-        """Reorder values (n,) by the toolkit's anno_ids that were aligned by the manifest's, 0 to n - 1."""
+        """Reorder values that were read by the manifest's anno_ids, but are numbered by the toolkit's."""
         values = np.empty_like(ttc_s)
         values[self.rows] = ttc_s[np.argsort(self.manifest.anno_id, kind="stable")]
         return values

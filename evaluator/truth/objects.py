@@ -26,7 +26,7 @@ _FARTHEST: Final = 2.0  # a box may be partly outside the image; beyond this it 
 class Objects:
     """Annotations as float64 arrays, NaN where missing; None without the column.
 
-    `occ_ratio` and `same_lane` (1 or 0) are (n,), `box2d` is (n, 4).
+    `occ_ratio` and `same_lane` (1 or 0) have the shape `(n,)`, `box2d` has `(n, 4)`.
     """
 
     occ_ratio: Floats | None = None

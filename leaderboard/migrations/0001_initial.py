@@ -227,7 +227,7 @@ class Migration(migrations.Migration):
             name='Mail',
             fields=[
                 ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('kind', models.CharField(choices=[('account', 'Your account'), ('scored', 'A file that I submitted on the site is scored, is rejected or fails'), ('edition', 'A board that lists my team’s methods gets a new edition'), ('token', 'One of my API tokens expires within a week'), ('deadline', 'A split that my team submitted to closes within three days'), ('announcement', 'There is an announcement about a split that my team submitted to')], max_length=16)),
+                ('kind', models.CharField(choices=[('account', 'Your account'), ('scored', 'A file that I submitted on the site is scored, is rejected, or cannot be scored'), ('edition', 'A board that lists my team’s methods gets a new edition'), ('token', 'One of my API tokens expires within a week'), ('deadline', 'A split that my team submitted to closes within three days'), ('announcement', 'There is an announcement about a split that my team submitted to')], max_length=16)),
                 ('recipient', models.EmailField(blank=True, max_length=254)),
                 ('subject', models.CharField(blank=True, max_length=250)),
                 ('text', models.TextField(blank=True)),

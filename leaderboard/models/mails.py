@@ -11,7 +11,7 @@ class MailKind(models.TextChoices):
     """What a mail is about. A person can switch off every kind but the first."""
 
     ACCOUNT = "account", "Your account"
-    SCORED = "scored", "A file that I submitted on the site is scored, is rejected or fails"
+    SCORED = "scored", "A file that I submitted on the site is scored, is rejected, or cannot be scored"
     EDITION = "edition", "A board that lists my team’s methods gets a new edition"
     TOKEN = "token", "One of my API tokens expires within a week"
     DEADLINE = "deadline", "A split that my team submitted to closes within three days"

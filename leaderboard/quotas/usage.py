@@ -249,7 +249,7 @@ def _left(rules: QuotaRules, *, n_used: int) -> str:
     else:
         n_left = max(0, rules.quota_limit - n_used)
         limit = counted(rules.quota_limit, "submission")
-        text = f"{n_left} of {limit} left within {span(rules.quota_window)}"
+        text = f"{n_left} of {limit} left (limit per {span(rules.quota_window)})"
     return f"{text}, at least {span(rules.quota_min_gap)} apart." if rules.quota_min_gap else f"{text}."
 
 

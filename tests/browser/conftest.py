@@ -104,7 +104,7 @@ def sign_up(page: Page, *, email: str, name: str) -> None:
     """Make an account; the site signs it in at once."""
     page.goto("/accounts/signup/")
     page.get_by_label("Email").fill(email)
-    page.get_by_label("Name shown on the board").fill(name)
+    page.get_by_label("Name on the board").fill(name)
     page.get_by_label("Password", exact=True).fill(PASSWORD)
     page.get_by_label("Password (again)").fill(PASSWORD)
     page.get_by_role("button", name="Sign up").click()

@@ -47,7 +47,7 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     page.wait_for_url("**/accounts/signup/?next=*")
     for label, text in (
         ("Email", "keys@example.org"),
-        ("Name shown on the board (optional)", "Keyboard team"),
+        ("Name on the board (optional)", "Keyboard team"),
         ("Password", PASSWORD),
         ("Password (again)", PASSWORD),
     ):

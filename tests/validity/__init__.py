@@ -2,7 +2,7 @@
 
 Errors of made-up methods on made-up recordings, where the truth is known: the models of `tests.error_models`.
 Each repetition draws everything again. The suite runs few repetitions; the command many, and prints the
-tables of `docs/validation.md`.
+numbers of `docs/validation.md`.
 """
 
 from collections.abc import Iterator

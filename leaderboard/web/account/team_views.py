@@ -24,10 +24,10 @@ from leaderboard.web.forms import SiteForm
 
 class SignupNameForm(forms.Form):
     name = forms.CharField(
-        label="Name shown on the board (optional)",
+        label="Name on the board (optional)",
         max_length=80,
         required=False,
-        help_text="Your own name or your team's. Without one, boards show “Team” and a number.",
+        help_text="Your own name or your team’s. Without one, boards show “Team” and a number.",
         widget=forms.TextInput(attrs={"autocomplete": "nickname"}),
     )
     field_order = ["email", "name", "password1", "password2"]

@@ -31,8 +31,8 @@ class TokenForm(SiteForm):
         label="Scope",
         widget=forms.CheckboxSelectMultiple,
         choices=[
-            (Scope.SUBMIT, "submit: send and withdraw files, edit and publish methods"),
             (Scope.READ, "read: see submissions and results"),
+            (Scope.SUBMIT, "submit: send and withdraw files, edit and publish methods"),
         ],
         initial=list(Scope.values),
         error_messages={"required": "The token has no scope; expected read, submit, or both."},

@@ -140,7 +140,8 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric], references: Sequence[Re
         ),
         numbers=tuple(range(1, len(columns))),
         has_intervals=has_intervals,
-        note=f"{WARNING.symbol} is shown for 0 to {_NEAR_S:g} s. It is at most 1% at all other times."
+        note=f"The warning error ({WARNING.symbol}), explained below, is shown for 0 to {_NEAR_S:g} s. "
+        "Elsewhere it is at most 1%."
         if axes.get(WARNING, _TTC_AXIS) is not _TTC_AXIS
         else "",
     )
@@ -296,7 +297,7 @@ def histogram(bins: Sequence[Row], metric: Metric) -> Chart:
     bar_axis = {"type": "category", "data": list(range(len(bins))), "show": False}
     frame = Frame(
         x_axes=[bar_axis],
-        y_axes=[y_axis("Sequences", {"type": "value", "min": 0, "minInterval": 1})],
+        y_axes=[y_axis("Sequences", {"type": "value", "min": 0, "minInterval": 1, "boundaryGap": [0, "5%"]})],
         series=[bars("Sequences", bar_marks, "--s1")],
         further_x_axes=[x_axis(f"{metric.title} ({metric.symbol}), {metric.unit}".rstrip(", "), scale)],
     )

@@ -39,6 +39,7 @@ _VERBS: Final = {
     "removed_member": "member removed",
     "revoked_invitation": "invitation revoked",
     "cleared": "texts deleted",
+    "hidden": "removed from all boards",
 }
 _NOUNS: Final = {
     "ApiToken": "API token",

@@ -24,9 +24,9 @@ def _protocol_words(protocol: Protocol) -> str:
     """Tell protocols apart.
 
     >>> _protocol_words(PROTOCOLS["tsttc-2"]), _protocol_words(PROTOCOLS["toolkit"])
-    ('MiD, RTE, WE; truncates predictions near 0', 'MiD, RTE; rejects files in which a prediction has no MiD')
+    ('MiD, RTE, WE; truncates predictions near 0', 'MiD, RTE; rejects a file if a prediction has no MiD')
     """
-    rejects = "rejects files in which a prediction has no MiD"
+    rejects = "rejects a file if a prediction has no MiD"
     near_zero = "truncates predictions near 0" if protocol.near_zero_s else rejects
     return f"{', '.join(metric.symbol for metric in protocol.metrics)}; {near_zero}"
 
@@ -48,10 +48,8 @@ class OpenForm(SiteForm):
     )
 
     def __init__(self, data: Any = None, *, split: Split) -> None:
-        published = split.current_edition
         self.truths = list(GroundTruth.objects.filter(split=split.truth_split_id).order_by("-imported_at"))
-        initial = {"digest": published.ground_truth_id, "protocol": published.protocol} if published else {}
-        super().__init__(data, initial=initial)
+        super().__init__(data)
         self.fields["digest"].choices = [(truth.pk, truth.pk) for truth in self.truths]  # type: ignore[attr-defined]  # a ChoiceField
 
 

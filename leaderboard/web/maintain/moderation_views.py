@@ -136,9 +136,9 @@ ACTIONS: Final[Mapping[str, Action]] = {
     ),
     "clear-texts": Action(
         Method,
-        "Delete the description and links of the method",
+        "Delete the texts of the method",
         "Description, paper link and code link are deleted. The team can write new ones.",
-        "Delete description and links",
+        "Delete texts",
         ActionForm,
         lambda subject, now, **arguments: hiding.clear_texts(method=subject, **arguments),
     ),
@@ -161,10 +161,10 @@ ACTIONS: Final[Mapping[str, Action]] = {
     ),
     "hide": Action(
         Submission,
-        "Hide the submission",
-        "It is removed from all boards, including those of earlier dates. Its team still sees it as "
-        "withdrawn. This cannot be undone.",
-        "Hide",
+        "Remove the submission",
+        "Its scores and its row are removed from all boards, including those of past days. Its team still "
+        "sees it as withdrawn. This cannot be undone.",
+        "Remove",
         FinalActionForm,
         lambda subject, **arguments: hiding.withdraw_entry(submission=subject, is_hidden=True, **arguments),
     ),

@@ -24,7 +24,7 @@ def change_table(preview: Preview) -> dict[str, Any]:
     """Return the preview for the template."""
     primary, names = preview.edition.rules.primary.name, _shown_names(preview)
     return {
-        "headings": [(score_heading(name, primary=primary), _note(name, preview)) for name in names],
+        "headings": [score_heading(name, primary=primary) for name in names],
         "rows": [_change_row(change, names, preview) for change in preview.entries],
         "has_states": any({e.old_status, e.new_status} != {Status.SCORED} for e in preview.entries),
         "has_unranked": any(None in (e.old_rank, e.new_rank) for e in preview.entries),
@@ -108,15 +108,15 @@ def _protocol_effects(preview: Preview) -> Iterator[str]:
 def _state_effects(preview: Preview) -> Iterator[str]:
     """Word how many entries lose all of their scores, or get their first."""
     if n := preview.n_newly_rejected:
-        yield f"{counted(n, 'scored entry', 'scored entries')} become{'s' * (n == 1)} rejected."
+        yield f"{counted(n, 'scored submission')} become{'s' * (n == 1)} rejected."
     n = sum(Status.SCORED == e.new_status != e.old_status for e in preview.entries)
     if n:
-        yield f"{counted(n, 'more entry', 'more entries')} {'is' if n == 1 else 'are'} scored."
+        yield f"{counted(n, 'more submission')} {'is' if n == 1 else 'are'} scored."
 
 
 def _share(n: int, preview: Preview) -> str:
     n_entries = len(preview.entries)
-    entries = counted(n_entries, "entry", "entries")
+    entries = counted(n_entries, "scored submission")
     if n < n_entries:
         return f"{n:,} of {entries}"
     return entries if n == 1 else f"all {entries}"
@@ -145,13 +145,6 @@ def _shown_names(preview: Preview) -> tuple[str, ...]:
     """Return the scores of the new protocol, and the overall ones that it drops."""
     kept = preview.edition.rules.score_names
     return tuple(name for name in preview.names if name in kept or range_of(name) is None)
-
-
-def _note(name: str, preview: Preview) -> str:
-    """Say of a column that only one of both protocols has it."""
-    if name not in preview.edition.rules.score_names:
-        return "removed"
-    return "" if name in preview.published.rules.score_names else "new"
 
 
 def _change_row(change: Change, names: Sequence[str], preview: Preview) -> dict[str, Any]:

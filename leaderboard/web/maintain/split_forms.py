@@ -6,13 +6,21 @@ from datetime import datetime
 from typing import Any, Final, NamedTuple
 
 from django import forms
+from django.db.models import Max
 from django.urls import reverse_lazy
 from django.utils.functional import lazy
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
 from leaderboard.editions import deadlines
-from leaderboard.editions.policy import MAX_DESCRIPTION, MAX_POSITION, NAMES, POSITION_FAULT, Policy
+from leaderboard.editions.policy import (
+    FIRST_POLICY,
+    MAX_DESCRIPTION,
+    MAX_POSITION,
+    NAMES,
+    POSITION_FAULT,
+    Policy,
+)
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Split
 from leaderboard.models.benchmark import Listing
@@ -23,10 +31,9 @@ from leaderboard.web.maintain.quota_forms import QuotaRulesForm
 _ZONE: Final = "Add the time zone: UTC, AoE or +01:00."
 _KEEP_SMALL: Final = (
     "If this split shares a hidden ground truth with another split, teams get more tries at the same hidden "
-    "values. Then keep the quota small."
+    "values. In that case, keep the quota small."
 )
 
-_IMPORT: Final = "Leave the split switched off until you import them (import_truth)."
 _CHALLENGE: Final = "A challenge on the same labels. You can list it at once."
 
 
@@ -96,7 +103,7 @@ class PolicyForm(QuotaRulesForm):
     opens_at = MomentField("Opens", "Empty: as soon as there is ground truth.")
     closes_at = MomentField("Closes", "Empty: never.")
     announcement = forms.CharField(
-        label="Text of the announcement",
+        label="Announcement text",
         required=False,
         max_length=300,
         help_text="One line of plain text on the pages of the split and in the API. Empty: no announcement.",
@@ -105,8 +112,7 @@ class PolicyForm(QuotaRulesForm):
     decimals = forms.TypedChoiceField(
         choices=[(1, "one"), (2, "two")],
         coerce=int,
-        help_text="Decimal places of the scores, from the next edition on. More decimals reveal more about a "
-        "hidden ground truth.",
+        help_text="Decimal places of the scores. More decimals reveal more about a hidden ground truth.",
     )
     needs_admission = forms.BooleanField(
         label="Only admitted teams can submit",
@@ -172,6 +178,11 @@ class NewSplitForm(PolicyForm):
         label="Ground truth",
         widget=forms.RadioSelect,
         initial="hidden",
+        help_text=lazy(format_html, SafeString)(
+            'Leave a split with new ground truth switched off until you <a href="{}#splits-and-challenges">'
+            "import the ground truth</a>.",
+            reverse_lazy("guide", args=["maintainers"]),
+        ),
         error_messages={"required": "No ground truth was chosen; expected one of those listed."},
     )
 
@@ -186,10 +197,17 @@ class NewSplitForm(PolicyForm):
         super().__init__(data, initial=initial)
         able = Split.objects.filter(same_truth_as=None).exclude(current_edition=None)
         self.fields["truth"].choices = [  # type: ignore[attr-defined]  # a ChoiceField
-            ("hidden", _choice("New, hidden", f"Teams cannot read the labels. {_IMPORT}")),
-            ("open", _choice("New, open", f"The labels are public. {_IMPORT}")),
+            ("hidden", _choice("New, hidden", "Teams cannot read the labels.")),
+            ("open", _choice("New, open", "The labels are public.")),
             *((f"as {row.pk}", _choice(f"Same as {row.title}", _CHALLENGE)) for row in able),
         ]
+
+    @classmethod
+    def first_values(cls) -> dict[str, Any]:
+        """Return what an empty form begins with: the split comes after the others."""
+        last = Split.objects.aggregate(last=Max("position"))["last"]
+        after = {} if last is None else {"position": min(last + 1, MAX_POSITION)}
+        return cls.filled_with(FIRST_POLICY) | after
 
     def wanted(self) -> dict[str, Any]:
         """Return the cleaned fields under the names of `new_splits.add_split`."""

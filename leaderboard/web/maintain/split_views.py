@@ -33,7 +33,7 @@ def splits(request: HttpRequest) -> HttpResponse:
             split,
             (admissions.sentence_of(split, now=now) or "yes")
             if split.has_ground_truth
-            else "not yet: no ground truth",
+            else "no: ground truth not imported",
             split.announcement_at(now),
             quota_tables.submissions_of(split),
         )
@@ -44,7 +44,7 @@ def splits(request: HttpRequest) -> HttpResponse:
 
 @maintainers_form
 def add(request: HttpRequest) -> HttpResponse:
-    form = NewSplitForm.asked(request, initial=PolicyForm.filled_with(policy.FIRST_POLICY))
+    form = NewSplitForm.asked(request, initial=NewSplitForm.first_values())
     if form.is_valid():
         with form.refusals():
             split = new_splits.add_split(now=timezone.now(), actor=maintainer_of(request), **form.wanted())

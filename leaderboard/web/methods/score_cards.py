@@ -43,7 +43,8 @@ class ScoreCard(NamedTuple):
     gap: Gap | None  # to the best of the others
     strip: SafeString
     strip_words: str
-    ends: tuple[str, str]  # the lowest and the highest value on the strip
+    is_log: bool  # the scale of the strip
+    ends: tuple[str, str]  # the lowest and the highest value on it
 
 
 def score_card(entry: Entry, rows: Sequence[Entry], *, n_ranked: int, gap: Gap | None) -> ScoreCard | None:
@@ -53,6 +54,7 @@ def score_card(entry: Entry, rows: Sequence[Entry], *, n_ranked: int, gap: Gap |
     # An entry without a rank is not the best of its method: the board's row of that method is another one.
     others = [row for row in rows if entry.rank is None or row.method_id != entry.method_id]
     values = [row.value for row in others if row.value is not None]
+    known = [*values, entry.value]
     metric = metric_of(entry.primary)
     n_better = sum(value < entry.value for value in values)
     words = f"{metric.symbol} of all methods: {n_better} lower, {len(values) - n_better} not."
@@ -66,6 +68,7 @@ def score_card(entry: Entry, rows: Sequence[Entry], *, n_ranked: int, gap: Gap |
         gap=gap,
         strip=whiskers.strip(values, own=entry.value) if len(values) > 1 else NOTHING,
         strip_words=words,
+        is_log=whiskers.WhiskerScale(min(known), max(known)).is_log,
         ends=_ends([entry, *(row for row in others if row.value is not None)]),
     )
 

@@ -66,7 +66,7 @@ def state_line(
         is_moving=awaits_intervals or not progress.is_final,
         truncation=truncation(progress.truncated),
         problems=problems,
-        listing="" if is_whole else f"Equal problems are listed together{cut}.",
+        listing="" if is_whole else f"Identical problems are grouped{cut}.",
     )
 
 

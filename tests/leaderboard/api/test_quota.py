@@ -31,7 +31,7 @@ def test_quota_tells_each_splits_rules_and_what_is_left(edition: Edition, owner:
         "min_gap_s": 86_400,
         "rejected_used": 0,
         "rejected_limit": None,
-        "sentence": "3 of 3 submissions left within 30 days, at least 24 hours apart.",
+        "sentence": "3 of 3 submissions left (limit per 30 days), at least 24 hours apart.",
     }
 
 

@@ -165,7 +165,8 @@ def own_score(board: dict[str, Any]) -> float:
 
 
 def test_page_adds_a_challenge_and_says_what_is_wrong_at_the_field(keeper: Client, edition: Edition) -> None:
-    assert_sound(keeper.get(ADD))
+    last = max(Split.objects.values_list("position", flat=True))
+    assert filled_in(assert_sound(keeper.get(ADD)))["position"] == str(last + 1)
     answer = keeper.post(ADD, NEW)
     assert (answer.status_code, answer.headers["Location"]) == (302, SPLITS)
     made = Split.objects.get(pk="challenge-2027")

@@ -73,7 +73,7 @@ def test_what_cannot_be_deleted_says_what_keeps_it_and_leads_to_withdrawing(
     offered = [a.text for a in pages.get(signed_in, address[:-7]).one("main").all("a")]
     assert "Delete…" not in offered, "it would lead to a refusal"
     main = pages.get(signed_in, address).one("main")
-    assert main.one("h1").text == "Scored cannot be deleted"
+    assert main.one("h1").text == "“Scored” cannot be deleted"
     assert "It has 1 scored submission." in main.text
     (link,) = [a for a in main.all("a") if a.text == "withdraw its submissions"]
     assert link.attributes["href"] == f"/submissions/?method={sent.method_id}"

@@ -113,7 +113,7 @@ def test_the_maintainers_form_previews_saves_and_brings_back_earlier_texts(
 def test_maintainers_see_that_nobody_wrote_the_imprint_and_visitors_do_not(
     keeper: Client, benchmark: None, maintainer: User
 ) -> None:
-    asked = "names no person and no postal address"
+    asked = "has no name or postal address yet"
     for address in ("/maintain/", "/maintain/pages/"):
         assert asked in assert_sound(keeper.get(address)).one("main").text
     assert asked not in shown(Client(), "imprint")

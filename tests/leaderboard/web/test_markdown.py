@@ -78,6 +78,8 @@ def test_short_cells_stay_in_one_line_and_long_ones_get_room() -> None:
     drawn = markdown.page(f"| a | b |\n|---|---|\n| 93.3 ± 0.6 | {'word ' * 9}|\n").html
     assert "<td>93.3\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}0.6</td>" in drawn
     assert '<td data-label="b" class="wraps">word word' in drawn, "with its head, for a phone"
+    drawn = markdown.page("| a |\n|---|\n| Values lie beyond ±20 s: milliseconds |\n").html
+    assert ">Values lie beyond ±20 s:" in drawn, "a sentence breaks between its words"
 
 
 def test_an_option_and_a_name_in_code_do_not_break_at_their_hyphens() -> None:

@@ -92,6 +92,17 @@ def test_pages_offer_only_what_can_be_done_to_an_edition(keeper: Client, rescore
         assert "Roll back to edition 1" in main_text(keeper, page)
 
 
+def test_a_draft_is_opened_with_what_the_maintainer_chose(keeper: Client, rescored: Edition) -> None:
+    radios = [
+        each.attributes for each in get(keeper, OPEN).all("input") if each.attributes["type"] == "radio"
+    ]
+    assert {each["name"] for each in radios} == {"digest", "protocol"}
+    assert not any("checked" in each for each in radios)
+    answer = keeper.post(OPEN)
+    assert answer.status_code == 422
+    assert "No protocol was chosen; expected one of those listed." in pages.page(answer).text
+
+
 # --- progress --------------------------------------------------------------------------------------------
 
 
@@ -122,8 +133,8 @@ def test_comparison_is_the_previews_line_by_line(keeper: Client, rescored: Editi
     assert (expected.n_changed, expected.n_moved) == (4, 1)
     assert effects(root) == [
         "Ground truth: 5 labels corrected.",
-        "MiD and RTE change for all 4 entries.",
-        "1 of 4 entries gets another rank.",
+        "MiD and RTE change for all 4 scored submissions.",
+        "1 of 4 scored submissions gets another rank.",
     ]
     rows = root.one("table", class_="changes").one("tbody").all("tr")
     assert [row.one("th").one("a").text for row in rows] == [change.method for change in expected.changes]
@@ -164,7 +175,7 @@ def test_entries_that_become_rejected_say_why(
     open_edition(extended(tmp_path))
     builders.score_all()
     root = get(keeper, SECOND)
-    assert "4 scored entries become rejected." in effects(root)
+    assert "4 scored submissions become rejected." in effects(root)
     for row in root.one("table", class_="changes").one("tbody").all("tr"):
         status = row.one("td", class_="status")
         assert status.one("summary").text == (
@@ -190,12 +201,12 @@ def test_a_protocol_that_lacks_a_metric_says_who_loses_it(
     root = get(keeper, SECOND)
     assert effects(root) == [
         "The protocol changes from tsttc-2 to toolkit. The new one does not compute the warning error (WE): "
-        "all 2 entries lose this score.",
+        "all 2 scored submissions lose this score.",
         "MiD, RTE, all ranks and the ground truth stay the same.",
     ]
     assert effects(get(keeper, f"{SECOND}publish/"))[:2] == effects(root)
-    heads = [head.text for head in root.one("table", class_="changes").one("thead").all("th")]
-    assert "removed" in heads[-1]
+    table = root.one("table", class_="changes").one("tbody")
+    assert len(table.all("del")) == 2, "the warning errors that go"
     publish(draft)
     open_edition(protocol="tsttc-1")
     assert effects(get(keeper, "/maintain/test/editions/3/")) == [
@@ -203,7 +214,8 @@ def test_a_protocol_that_lacks_a_metric_says_who_loses_it(
         "The ground truth stays the same.",
     ]
     back = get(keeper, f"{SECOND}roll-back/")
-    assert "The new one adds the warning error (WE): all 2 entries get this score." in effects(back)[0]
+    gain = "The new one adds the warning error (WE): all 2 scored submissions get this score."
+    assert gain in effects(back)[0]
 
 
 def test_csv_has_every_number_and_guards_texts(keeper: Client, rescored: Edition) -> None:

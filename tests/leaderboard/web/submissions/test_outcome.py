@@ -64,6 +64,9 @@ def test_maintainer_reads_the_same_rank_of_a_private_one_and_nobody_quotes_it(
     builders.score_all()
     root = look(keeper, sent)
     assert "Rank if public1 of" in card(root)
+    strip = root.one("figure", class_="all-values").text
+    assert "every method on the board (log scale), from" in strip
+    assert "the tall mark is this one, which is private" in strip
     assert ", rank" not in root.one("code", id="citation").text
     assert root.one("code", id="latex-row").text.startswith("-- &")
 

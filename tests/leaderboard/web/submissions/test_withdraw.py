@@ -127,7 +127,7 @@ def test_page_of_the_best_says_that_the_next_best_replaces_it(
     ]
     assert answers == [False, True]
     root = pages.page(signed_in.get(address(worse, "withdraw/")))
-    assert "The current board does not show this submission: no rank on it changes." in root.one("main").text
+    assert "This submission is not on the current board, so no rank changes." in root.one("main").text
 
 
 def test_withdrawing_asks_for_the_tick_that_publishing_asks_for(signed_in: Client, sent: Submission) -> None:
