@@ -52,7 +52,7 @@ def box_around(centre: ArrayLike, size: ArrayLike) -> Floats:
 
 
 def expand(boxes: ArrayLike, ratio: ArrayLike) -> Floats:
-    """Expand boxes (…, 4) `ratio` times about their centres.
+    """Return `boxes`, an array of shape (…, 4), enlarged `ratio` times about their centres.
 
     >>> expand([10, 20, 30, 50], 2).tolist()
     [0.0, 5.0, 40.0, 65.0]
@@ -92,10 +92,13 @@ def shared_expansion(
 
 
 def scale_ratio_of_boxes(reference: ArrayLike, target: ArrayLike, *, measure: Measure) -> Floats:
-    """Return α (…,): the `measure` of the reference boxes over that of the target boxes.
+    """Return the scale ratios α of pairs of boxes: the size in the reference divided by that in the target.
 
-    The paper's Detection divides areas (§6.1) and takes that for α; "sqrt-area" is the correct ratio. Boxes
-    without size give NaN or infinity.
+    - `reference`, `target`: boxes, arrays of shape (…, 4).
+    - `measure`: what counts as the size: "area", "sqrt-area", "height" or "width". The paper's Detection
+      takes the area (§6.1); the square root of the area is correct.
+
+    The result has the shape (…,). Boxes without size give NaN or infinity.
 
     >>> reference, target = [0, 0, 8, 8], [0, 0, 10, 10]
     >>> ratios = (scale_ratio_of_boxes(reference, target, measure=m) for m in MEASURES)
@@ -113,7 +116,7 @@ def scale_ratio_of_boxes(reference: ArrayLike, target: ArrayLike, *, measure: Me
 
 
 def is_usable(box: ArrayLike, *, min_side_px: float = 0.0) -> bool:
-    """Whether all four numbers are finite and both sides are greater than `min_side_px`.
+    """Return whether all four numbers of `box` are finite, and both sides longer than `min_side_px`.
 
     >>> is_usable([10, 20, 30, 50])
     True

@@ -22,7 +22,13 @@ TARGET = N_FRAMES - 1
 
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """One sequence: its key, boxes (6, 4) in pixels (NaN if absent), and `load(frame, colour)`."""
+    """One sequence: its number, its boxes and its six frames.
+
+    - `anno_id`: the number of the sequence.
+    - `boxes`: an array of shape (6, 4), for each frame x1, y1, x2, y2 in pixels. A missing box is NaN.
+    - `load`: returns a frame: `load(frame, colour)` with the number 0 to 5, and true for colour or false for
+      grey.
+    """
 
     anno_id: int
     boxes: NDArray[np.float64]
@@ -30,7 +36,7 @@ class Clip:
 
     @classmethod
     def from_frames(cls, frames: Sequence[Image], *, boxes: NDArray[np.float64], anno_id: int = 0) -> Clip:
-        """Make a clip of six images, all grey or all colour."""
+        """Make a clip of six images, which are all grey or all in colour."""
 
         def load(frame: int, colour: bool) -> Image:
             image = frames[frame]
@@ -42,9 +48,9 @@ class Clip:
         return cls(anno_id=anno_id, boxes=np.asarray(boxes, dtype=np.float64), load=load)
 
     def grey(self, frame: int) -> Image:
-        """Return frame 0…5 as (height, width), uint8."""
+        """Return a frame, 0 to 5, in grey: an array of shape (height, width) of uint8."""
         return self.load(frame, False)
 
     def colour(self, frame: int) -> Image:
-        """Return frame 0…5 as (height, width, 3), uint8, blue first."""
+        """Return a frame, 0 to 5, in colour: (height, width, 3) of uint8, in the order blue, green, red."""
         return self.load(frame, True)

@@ -15,9 +15,10 @@ if TYPE_CHECKING:
 class Estimate:
     """The estimate of one sequence.
 
-    `scale_ratio` is α > 0, the object's size in the reference frame over that in the target frame.
-    `confidence` compares estimates of one baseline, without unit. `fallback` is why the value is not the
-    baseline's own, such as "box has no texture", else None.
+    - `scale_ratio`: α, the size of the object in the reference frame divided by its size in the target frame;
+      above 0.
+    - `confidence`: any number that is higher for better estimates of the same baseline.
+    - `fallback`: None, or the reason why this is not the baseline's own value, such as "box has no texture".
     """
 
     scale_ratio: float
@@ -26,10 +27,10 @@ class Estimate:
 
 
 class Estimator(Protocol):
-    """A baseline with its parameters.
+    """A baseline with its parameters: a callable that takes a clip and returns an estimate.
 
-    If a parameter is "auto", `used` holds the value actually chosen: a dict of parameters, which the
-    prediction file then has.
+    If a parameter may be "auto", the object needs an attribute `used`: a dict with the values that it chose.
+    The prediction file states them.
     """
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
@@ -49,7 +50,7 @@ PROBLEM_CODES: Final[dict[str, str]] = {
 
 
 class Unusable(Exception):
-    """A clip without an estimate; the message is the reason to count."""
+    """Raise this if a clip has no estimate. The message is the reason, which the run counts."""
 
 
 class SequenceFault(Unusable):

@@ -18,6 +18,8 @@ from tsttc_baselines.scales import Match, best_of
 
 MARGIN: Final = 24.0
 GAP: Final = 16.0
+SMALL: Final = 15.0
+"""The size of words, which stay readable where a phone shows the figure in its width."""
 
 
 class FrameCrop:
@@ -53,7 +55,7 @@ def search_figure(
     ttc_s = float(scale_ratio_to_ttc(match.scale_ratio, fps_hz=fps_of_gap(frame_gap)))
     truth = "" if true_ttc_s is None else f"; true TTC {seconds(true_ttc_s)}"
     headline = f"Sequence {clip.anno_id}: α = {match.scale_ratio:.3f}, TTC {seconds(ttc_s)}{truth}"
-    figure = Figure(920, 560, THEMES[theme], headline)
+    figure = Figure(560, 944, THEMES[theme], headline)
     colours = figure.theme
     figure.shapes.append(Text(headline, MARGIN, 36, colours.ink, size=18, is_bold=True))
     _add_crops(figure, clip, estimator, match, frame_gap)
@@ -65,8 +67,9 @@ def search_figure(
 
 
 def _add_crops(figure: Figure, clip: Clip, estimator: PixelMse, match: Match, frame_gap: int) -> None:
-    side = (figure.width - 2 * MARGIN - 3 * GAP) / 4
-    top, reference = 62.0, TARGET - frame_gap
+    side = (figure.width - 2 * MARGIN - GAP) / 2
+    left, right, top, below = MARGIN, MARGIN + side + GAP, 62.0, 62.0 + side + 64
+    reference = TARGET - frame_gap
     frames = (clip.grey(reference), clip.grey(TARGET))
     reference_box, target_box = estimator.boxes(clip, frames, frame_gap=frame_gap)
     best = int(np.argmin(match.errors))
@@ -76,17 +79,16 @@ def _add_crops(figure: Figure, clip: Clip, estimator: PixelMse, match: Match, fr
     matched_box = box_around(middle, scale * size)
     # Both crops have one scale, so that the eye sees the change of size; the third follows the found box.
     reach_px = 1.35 * float(max(size_of(reference_box).max(), size.max()))
-    crop_x = [MARGIN + i * (side + GAP) for i in range(4)]
     ours, theirs, matched = (
-        FrameCrop(image, centre=centre, reach_px=reach, x=x, y=top, side=side)
-        for image, centre, reach, x in (
-            (frames[0], centre_of(reference_box), reach_px, crop_x[0]),
-            (frames[1], centre_of(target_box), reach_px, crop_x[1]),
-            (frames[0], middle, scale * reach_px, crop_x[2]),
+        FrameCrop(image, centre=centre, reach_px=reach, x=x, y=y, side=side)
+        for image, centre, reach, x, y in (
+            (frames[0], centre_of(reference_box), reach_px, left, top),
+            (frames[1], centre_of(target_box), reach_px, right, top),
+            (frames[0], middle, scale * reach_px, left, below),
         )
     )
-    left = cv2.absdiff(theirs.picture.pixels, matched.picture.pixels)
-    strong = np.minimum(left.astype(np.uint16) * 3, 255).astype(np.uint8)
+    remaining = cv2.absdiff(theirs.picture.pixels, matched.picture.pixels)
+    strong = np.minimum(remaining.astype(np.uint16) * 3, 255).astype(np.uint8)
     colours = figure.theme
     figure.shapes += [
         ours.picture,
@@ -96,31 +98,28 @@ def _add_crops(figure: Figure, clip: Clip, estimator: PixelMse, match: Match, fr
         outline(theirs.to_figure(target_box), colour=colours.accent),
         matched.picture,
         outline(matched.to_figure(matched_box), colour=colours.mark),
-        Picture(strong, crop_x[3], top, side, side),
+        Picture(strong, right, below, side, side),
         outline(
-            [
-                crop_x[3] + v - crop_x[1] if i % 2 == 0 else v
-                for i, v in enumerate(theirs.to_figure(target_box))
-            ],
+            [v if i % 2 == 0 else v + below - top for i, v in enumerate(theirs.to_figure(target_box))],
             colour=colours.mark,
             width=1,
         ),
     ]
     captions = (
-        (f"Reference, frame {reference}", f"its box; found: {scale:.3f} × target"),
-        (f"Target, frame {TARGET}", "its box, the size that is compared"),
-        ("Reference, enlarged", f"by 1/{scale:.3f}, about the found box"),
-        ("Difference, × 3", f"RMS {math.sqrt(float(match.errors[best])):.1f} grey levels"),
+        (left, top, f"Reference, frame {reference}", f"its box; found: {scale:.3f} × target"),
+        (right, top, f"Target, frame {TARGET}", "its box, whose size is compared"),
+        (left, below, "Reference, enlarged", f"by 1/{scale:.3f}, about the found box"),
+        (right, below, "Difference, × 3", f"RMS {math.sqrt(float(match.errors[best])):.1f} grey levels"),
     )
-    for x, (first, second) in zip(crop_x, captions, strict=True):
-        figure.shapes.append(Text(first, x, top + side + 20, colours.ink, is_bold=True))
-        figure.shapes.append(Text(second, x, top + side + 37, colours.quiet, size=12))
+    for x, y, first, second in captions:
+        figure.shapes.append(Text(first, x, y + side + 21, colours.ink, SMALL + 1, is_bold=True))
+        figure.shapes.append(Text(second, x, y + side + 40, colours.quiet, SMALL))
 
 
 def _add_curve(
     figure: Figure, match: Match, estimator: PixelMse, *, frame_gap: int, true_ratio: float | None
 ) -> None:
-    left, right, top, bottom = 70.0, figure.width - 44.0, 356.0, 488.0
+    left, right, top, bottom = 60.0, figure.width - 36.0, 716.0, 860.0
     errors = np.sqrt(match.errors)
     low, high = float(match.scales[0]), float(match.scales[-1])
     roof = _round_up(float(errors.max()))
@@ -135,27 +134,29 @@ def _add_curve(
     figure.shapes.append(
         Text(
             "Root mean squared difference at the best shift, in grey levels",
-            left,
-            top - 14,
+            MARGIN,
+            top - 16,
             colours.quiet,
-            size=12,
+            SMALL,
         )
     )
     for part in (0.0, 0.5, 1.0):
         figure.shapes.append(Line([(left, y(part * roof)), (right, y(part * roof))], colours.hair))
-        figure.shapes.append(Text(f"{part * roof:g}", left - 8, y(part * roof) + 4, colours.quiet, 12, "end"))
+        figure.shapes.append(
+            Text(f"{part * roof:g}", left - 8, y(part * roof) + 5, colours.quiet, SMALL, "end")
+        )
     for tick in np.arange(math.ceil(low * 10 - 1e-9), math.floor(high * 10 + 1e-9) + 1) / 10:
         ttc_s = float(scale_ratio_to_ttc(tick, fps_hz=fps_of_gap(frame_gap)))
         figure.shapes.append(Line([(x(tick), bottom), (x(tick), bottom + 5)], colours.quiet))
-        figure.shapes.append(Text(f"{tick:.1f}", x(tick), bottom + 20, colours.ink, 12, "middle"))
-        figure.shapes.append(Text(seconds(ttc_s), x(tick), bottom + 36, colours.quiet, 12, "middle"))
+        figure.shapes.append(Text(f"{tick:.1f}", x(tick), bottom + 21, colours.ink, SMALL, "middle"))
+        figure.shapes.append(Text(seconds(ttc_s), x(tick), bottom + 39, colours.quiet, SMALL, "middle"))
     figure.shapes.append(
         Text(
             "scale ratio α, and the time to contact that it means",
             (left + right) / 2,
-            bottom + 56,
+            bottom + 64,
             colours.quiet,
-            12,
+            SMALL,
             "middle",
         )
     )
@@ -166,13 +167,13 @@ def _add_curve(
     )
     marked = [(match.scale_ratio, top + 6, f"α = {match.scale_ratio:.3f}", colours.mark)]
     if true_ratio is not None and low <= true_ratio <= high:
-        marked.append((true_ratio, top + 26, f"truth {true_ratio:.3f}", colours.ink))
+        marked.append((true_ratio, top + 28, f"truth {true_ratio:.3f}", colours.ink))
     for ratio, height, words, colour in marked:
         figure.shapes.append(Line([(x(ratio), height - 12), (x(ratio), bottom)], colour, 1.5))
         is_left = ratio < 1.2
         text_x = x(ratio) + (6 if is_left else -6)
         anchor: Anchor = "start" if is_left else "end"
-        figure.shapes.append(Text(words, text_x, height, colour, 13, anchor, is_bold=True))
+        figure.shapes.append(Text(words, text_x, height, colour, SMALL + 1, anchor, is_bold=True))
     for i in best_of(match.errors, n_top=estimator.top):
         figure.shapes.append(Dot(x(float(match.scales[i])), y(float(errors[i])), 4, colours.mark))
 

@@ -41,11 +41,16 @@ TRUTH: Final = "truth.csv"
 
 @dataclass(frozen=True, eq=False)
 class SequenceFolder:
-    """The sequences of a folder, in its manifest's order.
+    """The sequences of a folder, in the order of its manifest.
 
-    `boxes` is (n, 6, 4), NaN if absent: pixels, or parts of the image's width and height if `is_normalised`;
-    `boxes_from` is their file or folder. `images` holds the recordings' folders. `has_own_numbers` means
-    anno_ids without a manifest, which a board may number otherwise.
+    - `path`: the folder.
+    - `images`: the folder that has one folder for each recording.
+    - `manifest`: the list of the sequences.
+    - `boxes`: an array of shape (n, 6, 4), for each sequence the boxes of its six frames as x1, y1, x2, y2. A
+      missing box is NaN.
+    - `boxes_from`: the name of the file or folder that the boxes were read from.
+    - `is_normalised`: true if boxes are parts of the image's width and height, false if they are pixels.
+    - `has_own_numbers`: true if the folder has no manifest. A board may then have other anno_ids.
     """
 
     path: Path
@@ -62,30 +67,30 @@ class SequenceFolder:
         return self.manifest.n_sequences
 
     def digest(self) -> str:
-        """Hex SHA-256 of the sequences and their boxes."""
+        """Return the SHA-256 of the sequences and their boxes, as hexadecimal text."""
         content = hashlib.sha256(f"{self.manifest.digest} {self.is_normalised}".encode())
         content.update(np.ascontiguousarray(self.boxes).tobytes())
         return content.hexdigest()
 
     def rows_in_time(self) -> NDArray[np.intp]:
-        """Order all rows by recording, camera and time."""
+        """Return the numbers of all rows, ordered by recording, camera and time."""
         # Sequences that share frames follow each other.
         manifest = self.manifest
         return np.lexsort((manifest.ts_ns, np.array(manifest.cam_id), np.array(manifest.bag_stamp)))
 
     def frame_path(self, row: int, frame: int) -> Path:
-        """Return the file of a frame 0…5, or its name with .jpg."""
+        """Return the path of a frame, 0 to 5. If there is no file, the path ends in .jpg."""
         camera = self.images / self.manifest.bag_stamp[row] / f"cam{self.manifest.cam_id[row]}"
         ts_ns = int(self.manifest.ts_ns[row]) - (TARGET - frame) * FRAME_STEP_NS
         paths = [camera / f"{ts_ns}{extension}" for extension in EXTENSIONS]
         return next((path for path in paths if path.exists()), paths[0])
 
     def where(self, path: Path) -> str:
-        """Return a path for messages: relative to the folder, if it lies in it."""
+        """Return a path as messages show it: relative to the folder if it lies inside."""
         return path.relative_to(self.path).as_posix() if path.is_relative_to(self.path) else str(path)
 
     def clip(self, row: int, *, cache: ImageCache, with_images: bool = True) -> Clip:
-        """Return a row's clip, boxes in pixels; frames are decoded on access.
+        """Return the clip of a row, with boxes in pixels. A frame is decoded when it is first used.
 
         Boxes of 0…1 need the target's image size, or `NOMINAL_SIZE` without images. Raises `SequenceFault`
         for a missing or faulty image, then or on access.
@@ -105,7 +110,7 @@ class SequenceFolder:
         return Clip(anno_id=int(self.manifest.anno_id[row]), boxes=boxes, load=load)
 
     def size(self, row: int, *, cache: ImageCache) -> tuple[int, int]:
-        """Return width and height of the target's image in pixels; raises `SequenceFault`."""
+        """Return the width and height of the target frame in pixels. Raises `SequenceFault`."""
         path = self.existing_path(row, TARGET)
         return cache.size(path, where=self.where(path))
 
@@ -122,7 +127,7 @@ class SequenceFolder:
         return image
 
     def existing_path(self, row: int, frame: int) -> Path:
-        """Return the file of a frame 0…5; raises `SequenceFault`."""
+        """Return the path of a frame, 0 to 5. Raises `SequenceFault` if there is no file."""
         path = self.frame_path(row, frame)
         if not path.exists():
             reason, message = self._why_missing(row, frame, path)
@@ -158,10 +163,10 @@ class SequenceFolder:
 
 
 def read_folder(path: str | os.PathLike[str]) -> SequenceFolder:
-    """Read the folder of `tsttc baseline run`: tables and images; or the downloaded dataset.
+    """Read a folder that `tsttc baseline run` takes: tables and images, or the downloaded dataset.
 
-    Raises `Rejected` for other folders and for faulty tables or annotation files; boxes and images are
-    checked later.
+    `path` is the folder. Raises `Rejected` if it is neither, or if a table or an annotation file has an
+    error. Boxes and images are checked later.
     """
     path = Path(path)
     root = path / IMAGES if (path / IMAGES).is_dir() else path
@@ -193,7 +198,10 @@ def read_folder(path: str | os.PathLike[str]) -> SequenceFolder:
 
 
 def read_folder_truth(path: Path) -> GroundTruth:
-    """Read `truth.csv` or the annotation files of a folder; raises `Rejected` if it has neither."""
+    """Read the ground truth of the folder `path`: its `truth.csv`, or its annotation files.
+
+    Raises `Rejected` if it has neither.
+    """
     if (path / TRUTH).is_file():
         return read_truth(path / TRUTH)
     if not list_files(path):

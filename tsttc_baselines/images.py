@@ -22,7 +22,7 @@ _MAX_SIZES: Final = 4096
 
 
 class ImageCache:
-    """The last decoded images by path, one cache per process."""
+    """Keeps the last decoded images in memory, up to `max_bytes`. Make one for each process."""
 
     def __init__(self, *, max_bytes: int = MAX_CACHED_BYTES) -> None:
         self._max_bytes = max_bytes
@@ -31,7 +31,7 @@ class ImageCache:
         self._sizes: OrderedDict[Path, tuple[int, int]] = OrderedDict()
 
     def image(self, path: Path, *, colour: bool, where: str) -> Image:
-        """Return the image, read-only; raises `SequenceFault` at `where`."""
+        """Return the image of a file, read-only. Raises `SequenceFault`, whose message names `where`."""
         key = (path, colour)
         cached = self._images.get(key)
         if cached is not None:
@@ -43,7 +43,7 @@ class ImageCache:
         return image
 
     def size(self, path: Path, *, where: str) -> tuple[int, int]:
-        """Return width and height in pixels."""
+        """Return the width and height of an image in pixels."""
         if path not in self._sizes:
             self.image(path, colour=False, where=where)
         return self._sizes[path]

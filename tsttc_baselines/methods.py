@@ -22,7 +22,16 @@ Value = str | int | float | Path | None
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A parameter of a method and its option; `low` and `high` are inclusive."""
+    """A parameter of a method, and its option on the command line.
+
+    - `name`: the name in Python, such as `bins`.
+    - `default`: the value if none is given.
+    - `help`: one sentence for `tsttc baseline list`.
+    - `kind`: the type of the values.
+    - `choices`: the values that are allowed; empty if any is.
+    - `low`, `high`: the smallest and the largest value that are allowed; None for no limit.
+    - `is_required`: whether a value must be given.
+    """
 
     # Methods may share a name, with their own defaults but the same kind, choices and limits.
 
@@ -37,23 +46,28 @@ class Parameter:
 
     @property
     def default_in_words(self) -> str | None:
-        """The default in words, of a file its name; None without one."""
+        """The default as text, for a file only its name. None if there is no default."""
         if self.default is None:
             return None
         return self.default.name if isinstance(self.default, Path) else str(self.default)
 
     @property
     def option(self) -> str:
-        """The option of the command, such as `--frame-gap`."""
+        """The option on the command line, such as `--frame-gap`."""
         return "--" + self.name.replace("_", "-")
 
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A baseline: name, inputs, parameters and estimator.
+    """A method that `tsttc baseline run` can run.
 
-    `factory` is "module:name" of a callable with the parameters as keywords. `published` are the values of a
-    published row, or None. `frames` are the images it needs: none, reference and target, or all between.
+    - `name`: the name on the command line.
+    - `title`, `summary`: the name and one sentence for people.
+    - `factory`: "module:name" of a callable that takes the parameters as keywords and returns an `Estimator`.
+    - `parameters`: the parameters with their defaults.
+    - `published`: the values of the parameters in a published row; None if no row is published.
+    - `frames`: the images that it needs: "none", "pair" for the reference and the target frame, or "all" six.
+    - `boxes`: the boxes that it needs: "pair", or only that of the "target".
     """
 
     name: str
@@ -66,7 +80,10 @@ class Method:
     boxes: Literal["pair", "target"] = "pair"
 
     def filled(self, given: Mapping[str, Value]) -> dict[str, Value]:
-        """Fill in defaults; raises `KeyError` for unknown names, `ValueError` for missing or infinite."""
+        """Return all parameters: those `given`, and the defaults of the others.
+
+        Raises `KeyError` for an unknown name, and `ValueError` for a missing or infinite value.
+        """
         known = {parameter.name: parameter.default for parameter in self.parameters}
         strangers = [name for name in given if name not in known]
         if strangers:
@@ -80,7 +97,7 @@ class Method:
         return known | dict(given)
 
     def provenance(self, parameters: Mapping[str, Value], *, digests: Mapping[str, str] | None = None) -> str:
-        """Compare these parameters with the published row: as published, variant or unpublished.
+        """Return whether these parameters are "as published", a "variant" of the row, or "unpublished".
 
         `digests` are the SHA-256 of files among the parameters, by which a published file is known.
         """
@@ -92,7 +109,7 @@ class Method:
         return "as published" if is_published else "variant"
 
     def estimator(self, parameters: Mapping[str, Value]) -> Estimator:
-        """Make the estimator with these parameters."""
+        """Return the estimator with these parameters."""
         module, _, name = self.factory.partition(":")
         made: Estimator = getattr(import_module(module), name)(**parameters)
         return made
@@ -213,5 +230,5 @@ METHODS: Final[tuple[Method, ...]] = (
 
 
 def get_method(name: str) -> Method:
-    """Return the method with this name; raises `KeyError`."""
+    """Return the method of this package with this name. Raises `KeyError` if there is none."""
     return {method.name: method for method in METHODS}[name]

@@ -31,7 +31,10 @@ class MethodMissing(Exception):
 
 
 def find_method(name: str) -> Method:
-    """A method of this package, of an installed one, or MODULE:NAME; raises `MethodMissing`."""
+    """Return a method by its name: of this package, of an installed one, or MODULE:NAME.
+
+    Raises `MethodMissing` if there is none.
+    """
     for method in METHODS:
         if method.name == name:
             return method

@@ -48,10 +48,15 @@ Progress = Callable[[int], None]
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The estimates of a run; `scale_ratio` is (n,) in the manifest's order.
+    """The result of a run.
 
-    `n_fallback` counts by reason, most frequent first; `examples` has a problem for each. `n_resumed` values
-    come from an interrupted run, whose time `seconds` includes.
+    - `scale_ratio`: an array of one value for each sequence, in the order of the manifest.
+    - `n_fallback`: the number of fallbacks by reason, the most frequent first.
+    - `examples`: one problem for each reason.
+    - `n_resumed`: the number of values that an interrupted run had left.
+    - `seconds`: the time of the run, with that of the interrupted one.
+    - `meta`: the field `meta` of the prediction file.
+    - `data`: the bytes of the prediction file.
     """
 
     scale_ratio: NDArray[np.float64]
@@ -74,11 +79,20 @@ def run_method(
     strict: bool = False,
     progress: Progress = lambda _n_done: None,
 ) -> Run:
-    """Estimate every sequence of `folder` and write the prediction file `out`, as scale ratios.
+    """Estimate every sequence of a folder, and write a prediction file of scale ratios.
 
-    An interrupted run leaves a journal next to `out`; the same call continues. With `strict`, a fallback
-    raises `Rejected` and nothing is written; so does a run of nearly all fallbacks in any case. Raises
-    `Rejected` for an unusable folder, `WorkerEnded`, `OutputInUse`, `OSError`, and what the method raises.
+    - `folder`: the sequences, from `read_folder`.
+    - `method`: the method, from `get_method` or `find_method`.
+    - `parameters`: its parameters by name; defaults are filled in.
+    - `frame_gap`: frames between the reference and the target frame, 1 to 5.
+    - `out`: the file to write. While the run lasts, its state is in a file beside it that ends in `.part`;
+      after an interruption, the same call continues.
+    - `n_processes`: the number of processes.
+    - `strict`: if true, a fallback raises `Rejected` and no file is written.
+    - `progress`: is called with the number of finished sequences, at least every second.
+
+    Raises `Rejected` if the folder cannot be used or nearly all values are fallbacks. Also raises
+    `WorkerEnded`, `OutputInUse`, `OSError`, and what the method raises.
     """
     filled = method.filled(parameters)
     used = {**filled, **getattr(method.estimator(filled), "used", {})}

@@ -38,15 +38,26 @@ CONTEXT: Final = 1.2
 
 
 class BoxCrops(Dataset):  # type: ignore[misc]  # of an extra, which mypy skips
-    """Pairs of a folder with ground truth, or of another source; an item is a dict of tensors.
+    """A dataset of torch: pairs of crops, with their true scale ratio, to train a network.
 
-    `crops` is (2, 3, size_px, size_px), reference before target, red first, 0 … 1. Each shows a square about
-    its own box, so that the two differ by what the boxes get wrong. `box_ratio` is the ratio of the squares'
-    sides and `scale_ratio` the true α, both at a gap of five frames. `row` is the row of the ground truth.
-    A sequence without a usable pair has `usable` False, black crops, and a `box_ratio` of its boxes or 1.
+    The arguments:
 
-    With `augment`, items change each time, by torch's generator: colours and boxes, and some pairs are
-    mirrored, swapped or resized, with α as it then is.
+    - `source`: a folder with ground truth, or another source of sequences.
+    - `rows`: the rows of the ground truth to use; all by default.
+    - `size_px`: the width and height of a crop in pixels.
+    - `context`: the side of a crop, as a multiple of the square root of its box's area.
+    - `augment`: if true, items are changed at random each time: colours and boxes; some pairs are also
+      mirrored, swapped or resized, and their scale ratio is changed to fit.
+
+    An item is a dict of tensors:
+
+    - `crops`: shape (2, 3, size_px, size_px), the reference before the target, in red, green and
+      blue between 0 and 1. Each crop is a square about its own box.
+    - `box_ratio`: the side of the reference's square divided by that of the target's.
+    - `scale_ratio`: the true α, at a gap of five frames.
+    - `row`: the row of the ground truth.
+    - `usable`: false if the sequence has no usable pair. Its crops are black then, and `box_ratio` is that
+      of its boxes, or 1.
     """
 
     def __init__(
@@ -108,9 +119,11 @@ def _item(
 def crops_of_clip(
     clip: Clip, *, frame_gap: int, size_px: int = 64, context: float = CONTEXT
 ) -> tuple[Any, float]:
-    """The crops of a clip as in `BoxCrops`, a tensor, and their box ratio: what a method infers from.
+    """Return the crops of a clip, as a tensor like those of `BoxCrops`, and their `box_ratio`.
 
-    Raises `Unusable` where a box is missing, too small, or has its centre outside of the image.
+    `frame_gap` is the number of frames between reference and target, 1 to 5; `size_px` and `context` are as
+    in `BoxCrops`. Raises `Unusable` where a box is missing, too small, or has its centre outside of the
+    image.
     """
     boxes = boxes_of_pair(clip, frame_gap=frame_gap)
     frames = clip.colour(TARGET - frame_gap), clip.colour(TARGET)
@@ -123,7 +136,11 @@ def crops_of_clip(
 def crops_of(
     frames: tuple[Image, Image], boxes: tuple[Floats, Floats], *, size_px: int, context: float
 ) -> tuple[NDArray[np.float32], float]:
-    """(2, 3, size_px, size_px), 0 … 1, of frames in colour, and the ratio of the crops' sides there."""
+    """Return the crops of two frames, as an array like the tensors of `BoxCrops`, and their `box_ratio`.
+
+    `frames` are the reference and the target in colour, `boxes` their boxes; `size_px` and `context` are as
+    in `BoxCrops`.
+    """
     sides = [context * float(np.sqrt(size_of(box).prod())) for box in boxes]
     crops = []
     for image, box, side in zip(frames, boxes, sides, strict=True):

@@ -4,7 +4,7 @@ from typing import Any
 
 from django.conf import settings
 from django.http import Http404
-from drf_spectacular.utils import extend_schema
+from drf_spectacular.utils import extend_schema, extend_schema_field
 from rest_framework import serializers
 from rest_framework.permissions import AllowAny
 from rest_framework.request import Request
@@ -18,13 +18,18 @@ from leaderboard.api.schema import errors
 _ANY: Any = {"allow_null": True}
 
 
+@extend_schema_field({"type": ["boolean", "number", "string", "null"]})
+class _SettingField(serializers.JSONField):
+    pass
+
+
 class PublishedTableRowSerializer(serializers.Serializer[dict[str, Any]]):
     """One row of a table."""
 
     key = serializers.CharField(help_text="What the paper prints at the left of the row.")
     split = serializers.CharField(help_text="Split of the results; null in a table without results.", **_ANY)
     method = serializers.CharField(help_text="Short name of the method; null: not of a method.", **_ANY)
-    setting = serializers.JSONField(help_text="Setting of an ablation; null in other tables.")
+    setting = _SettingField(help_text="Setting of an ablation; null in other tables.")
     is_default = serializers.BooleanField(help_text="Whether it is the paper's default.")
     values = serializers.ListField(
         child=serializers.JSONField(), help_text="A value for each of `columns`: in results a number."

@@ -113,7 +113,7 @@ class ProblemSerializer(serializers.Serializer[Any]):
 class WarningSerializer(serializers.Serializer[Any]):
     """A probable mistake in a file that was scored nevertheless."""
 
-    code = serializers.CharField(help_text="Stable code for programs, listed in docs/file-format.md.")
+    code = serializers.CharField(help_text="Stable code for programs, listed in the guide Prediction files.")
     message = serializers.CharField(help_text="What was found, what was expected and the probable cause.")
 
 

@@ -48,8 +48,8 @@ class SubmissionsView(APIView):
         ],
         request={"multipart/form-data": NewSubmissionSerializer},
         responses={
-            201: SubmittedSerializer,
-            200: OpenApiResponse(SubmittedSerializer, "The submission made before with the same bytes."),
+            201: OpenApiResponse(SubmittedSerializer, "A new submission."),
+            200: OpenApiResponse(SubmittedSerializer, "The earlier submission of the same file."),
             **errors(400, 409, 413, 422, 429),
         },
     )

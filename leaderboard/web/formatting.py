@@ -123,6 +123,11 @@ def breakable(path: str) -> SafeString:
     return format_html("{}{}", format_html_join("", "{}/<wbr>", ((part,) for part in folders)), last)
 
 
+def lined(text: str) -> SafeString:
+    """Let each line of an output be indented where it continues, as HTML."""
+    return format_html_join("", '<span class="line">{}\n</span>', ((line,) for line in text.splitlines()))
+
+
 def day(at: datetime) -> SafeString:
     """Format the day, with time and zone on hover."""
     return _time(at, "%Y-%m-%d")

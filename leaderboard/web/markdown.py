@@ -13,6 +13,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 from leaderboard.web import equations
+from leaderboard.web.formatting import lined
 
 Target = Callable[[str], str]
 # Where links may lead: pages of any host, mail, and places on this site.
@@ -22,6 +23,10 @@ _MAX_TOGETHER: Final = 14
 _MIN_WRAPS: Final = 40
 # An option or a name in code, which a browser would break at its hyphens.
 _CODE: Final = re.compile(r"<code\b.*?</code>", re.DOTALL)
+# A long name or path, in code or a heading: it breaks at dots, slashes and underscores, not before an ending.
+_NAMES: Final = re.compile(r"(?<=<code>)[^<]+(?=</code>)|(?<=>)[^<]+(?=</h3>)")
+_LONG: Final = re.compile(r"\S{24,}")
+_JOINT: Final = re.compile(r"(?<=[\w}][/_])(?=[\w{])|(?<=\w\.)(?=\w{5})")
 _HYPHENED: Final = re.compile(r"(?<=[\s>\[])(?:--?[a-z]|[A-Za-z]+-)[\w-]*")
 _TABLE: Final = re.compile(r"<table>\n(.*?)</table>", re.DOTALL)
 
@@ -42,6 +47,7 @@ class Part:
     heading: TextHeading
     text: str
     prose: str = ""
+    rows: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -148,40 +154,50 @@ def _inline(tokens: Sequence[Token]) -> list[Token]:
 def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
     """Add anchors of headings and classes of tables, and collect the plain text of each part."""
     parts: list[Part] = []
-    heading, texts, prose, code, anchors = (
-        TextHeading(0, "", ""),
-        list[str](),
-        list[str](),
-        list[str](),
-        set[str](),
-    )
+    heading, anchors = TextHeading(0, "", ""), set[str]()
+    prose, rows, code = list[str](), list[str](), list[str]()
+
+    def part() -> Part:
+        whole = " ".join(filter(None, [*prose, *rows, *code]))
+        return Part(heading, whole, " ".join(prose), tuple(row.strip(" ·") for row in rows))
+
     _label_cells(tokens)
     for at, token in enumerate(tokens):
         if token.type == "heading_open":
-            parts.append(Part(heading, " ".join(filter(None, [*texts, *code])), " ".join(prose)))
+            parts.append(part())
             words = _plain(tokens[at + 1])
             heading = TextHeading(int(token.tag[1]), words, _anchor(words, anchors))
-            texts, prose, code = [], [], []
+            prose, rows, code = [], [], []
             token.attrSet("id", heading.anchor)
         elif token.type in {"fence", "code_block"}:
             code.append(token.content)
-            # Without a language it is an output or a synopsis, which nobody copies.
-            token.type, token.info = "fence", token.info or "text"
+            _draw_code(token)
+        elif token.type == "tr_open":
+            rows.append("")
         elif token.type == "inline" and tokens[at - 1].type != "heading_open":
-            is_cell = tokens[at - 1].type in {"th_open", "td_open"}
-            texts.append(_cell(token) if is_cell else _plain(token))
-            prose += [] if is_cell else texts[-1:]
+            if tokens[at - 1].type in {"th_open", "td_open"}:
+                rows[-1] += _cell(token)
+            else:
+                prose.append(_plain(token))
         elif token.type in {"th_open", "td_open"}:
             _shape(token, tokens[at + 1])
             if not tokens[at + 1].content:
                 token.tag = tokens[at + 2].tag = "td"  # a head without words names nothing
-    parts.append(Part(heading, " ".join(filter(None, [*texts, *code])), " ".join(prose)))
+    parts.append(part())
     html = parser.renderer.render(tokens, parser.options, {})
+    html = _NAMES.sub(lambda name: _LONG.sub(lambda long: _JOINT.sub("<wbr>", long[0]), name[0]), html)
     html = _CODE.sub(lambda code: _HYPHENED.sub(r'<span class="together">\g<0></span>', code[0]), html)
     html = _TABLE.sub(_framed, html)
     # The parser escapes what is no markup of its own.
-    drawn = SafeString(html)
-    return Document(drawn, tuple(part for part in parts if part.heading.level or part.text))
+    return Document(SafeString(html), tuple(part for part in parts if part.heading.level or part.text))
+
+
+def _draw_code(token: Token) -> None:
+    """Draw the lines of an output or a synopsis, which nobody copies; without a language, code is one."""
+    token.type, token.info = "fence", token.info or "text"
+    if token.info in {"text", "console"}:
+        drawn = f'<pre><code class="language-{token.info}">{lined(token.content)}</code></pre>\n'
+        token.type, token.content = "html_block", drawn
 
 
 def _framed(table: re.Match[str]) -> str:
@@ -212,9 +228,9 @@ def _plain(token: Token) -> str:
 
 
 def _cell(token: Token) -> str:
-    # The search shows a table as one line: cells need a separator.
+    # The search shows a row as one line: cells need a separator.
     words = _plain(token)
-    return f"{words} ·" if any(map(str.isalnum, words)) else ""
+    return f"{words} · " if any(map(str.isalnum, words)) else ""
 
 
 def _anchor(words: str, taken: set[str]) -> str:

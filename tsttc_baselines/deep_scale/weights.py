@@ -75,7 +75,12 @@ class Use:
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """The network's tensors, their use, and the rest of their card."""
+    """The weights of a network.
+
+    - `tensors`: the arrays by name.
+    - `use`: the settings that they need, such as the size of the grid.
+    - `card`: the recipe and the scores, as they are in the file.
+    """
 
     tensors: Tensors
     use: Use = field(default_factory=Use)
@@ -83,7 +88,7 @@ class Weights:
 
 
 def read_weights(path: Path) -> Weights:
-    """Read weights of this project or of the toolkit; raises `Rejected` and `OSError`."""
+    """Read a file of weights, this project's or the toolkit's. Raises `Rejected` and `OSError`."""
     with path.open("rb") as file:
         data = file.read(MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
@@ -102,7 +107,7 @@ def read_weights(path: Path) -> Weights:
 
 
 def write_weights(path: Path, weights: Weights) -> None:
-    """Write the project's own file, always the same bytes."""
+    """Write weights to a file of this project's own form. The same weights give the same bytes."""
     card = {**weights.card, "use": asdict(weights.use)}
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         _add(archive, CARD, (json.dumps(card, indent=1, ensure_ascii=False) + "\n").encode())

@@ -111,7 +111,9 @@ def _operation(method: str, path: str, node: Node, schemas: Node, shared: Node) 
         "bodies": [(media, _fields(body)) for media, body in bodies.items()],
         "answers": [
             (status, _kind(schema), answer["description"])
-            for status, answer in sorted(node["responses"].items())
+            for status, answer in sorted(
+                node["responses"].items(), key=lambda each: (each[0] != "201", each[0])
+            )
             if status < "4"
             for schema in [next(iter(answer.get("content", {"": {}}).values())).get("schema", {})]
         ],
@@ -184,7 +186,7 @@ def _kind(node: Node) -> str:
             return format_html_join(" or ", "{}", ((_kind(each),) for each in node[several]))
     if "enum" in node:
         return " | ".join("null" if value is None else str(value) for value in node["enum"])
-    types = node.get("type", "")
+    types = node.get("type", "any JSON value")
     names = [types] if isinstance(types, str) else list(types)
     if names[0] == "array":
         return format_html("list of {}", _kind(node["items"]))

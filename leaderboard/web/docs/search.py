@@ -8,6 +8,7 @@ from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
 
 from leaderboard.web.docs import guides, python_reference
+from leaderboard.web.markdown import Part
 
 MAX_QUERY: Final = 100
 MAX_HITS: Final = 12
@@ -58,7 +59,7 @@ def find(query: str) -> list[Hit]:
                 rank = (counts.count(0), n_beginnings, is_background, -score)
                 anchor = f"#{heading.anchor}" if heading.level > 1 else ""
                 address = reverse("guide", args=[name]) + anchor
-                snippet = _snippet(text, " ".join(part.prose.split()), asked)
+                snippet = _snippet(part, asked)
                 ranked.append((rank, Hit(guide.title, heading.text if anchor else "", address, snippet)))
     has_all = [each for each in ranked if each[0][0] == 0]
     hits = [hit for _, hit in sorted(has_all or ranked, key=lambda each: each[0])[:MAX_HITS]]
@@ -78,15 +79,14 @@ def _pattern(word: str, *, is_exact: bool = False) -> re.Pattern[str]:
     return re.compile(rf"(?<![^\W_]){re.escape(word)}{end}", re.IGNORECASE)
 
 
-def _snippet(text: str, prose: str, asked: list[re.Pattern[str]]) -> SafeString:
-    """Return prose with the words, or what else has the words, or the beginning of the prose."""
+def _snippet(part: Part, asked: list[re.Pattern[str]]) -> SafeString:
+    """Return prose with the words, or a row of a table with them, or the beginning of the prose."""
     marked = re.compile("(" + "|".join(word.pattern for word in asked) + ")", re.IGNORECASE)
-    text = prose if marked.search(prose) or not marked.search(text) else text
+    pieces = (part.prose, *part.rows)
+    text = " ".join(next(filter(marked.search, pieces), part.prose or part.text).split())
     first = marked.search(text)
     begin = text.rfind(" ", 0, max(0, first.start() - 60)) + 1 if first else 0
     end = len(text) if len(text) <= begin + _SNIPPET else text.rfind(" ", 0, begin + _SNIPPET)
-    pieces = enumerate(marked.split(text[begin:end].strip(" ·")))
-    drawn = format_html_join(
-        "", "{}", ([format_html("<mark>{}</mark>", p) if n % 2 else p] for n, p in pieces)
-    )
+    cut = enumerate(marked.split(text[begin:end].strip(" ·")))
+    drawn = format_html_join("", "{}", ([format_html("<mark>{}</mark>", p) if n % 2 else p] for n, p in cut))
     return format_html("{}{}{}", "… " if begin else "", drawn, " …" if end < len(text) else "")

@@ -70,7 +70,7 @@ def test_a_part_has_the_text_below_its_heading() -> None:
 
 def test_code_without_a_language_is_an_output_which_gets_no_button() -> None:
     for text in ("```\na    1\nbb   2\n```\n", "    a    1\n    bb   2\n"):
-        assert '<code class="language-text">a    1' in markdown.page(text).html
+        assert '<code class="language-text"><span class="line">a    1\n</span>' in markdown.page(text).html
     assert "language-sh" in markdown.page("```sh\ntsttc check a.json    # --manifest\n```\n").html
 
 
@@ -87,6 +87,15 @@ def test_an_option_and_a_name_in_code_do_not_break_at_their_hyphens() -> None:
         assert '<span class="together">--manifest</span>' in markdown.page(text).html
     drawn = markdown.page("`looks-like-ratios`, `a/b-c`").html
     assert drawn.count('<span class="together">') == drawn.count(">looks-like-ratios<") == 1
+
+
+def test_a_long_name_breaks_at_its_dots_slashes_and_underscores_alone() -> None:
+    drawn = markdown.page(
+        "`/api/v1/methods/{id}/my_file.json`, `a.short_name`\n\n### tsttc_baselines.read_folder()"
+    )
+    assert "/api/<wbr>v1/<wbr>methods/<wbr>{id}/<wbr>my_<wbr>file.json<" in drawn.html
+    assert ">a.short_name<" in drawn.html
+    assert ">tsttc_<wbr>baselines.<wbr>read_<wbr>folder()<" in drawn.html
 
 
 def test_an_equation_of_a_guide_is_mathml_and_one_of_a_maintainer_is_text() -> None:
