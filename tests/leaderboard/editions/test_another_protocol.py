@@ -104,7 +104,7 @@ def test_a_further_range_and_a_third_metric_stand_wherever_their_edition_is_show
     words = "Absolute TTC error (AE): the table shows only the overall value. Press AE above"
     assert words in page
     assert "20–60 s" in page
-    # So many columns as fit on a screen, each with its unit for phones; all of them where the metric is chosen.
+    # As many columns as fit on a screen, each with its unit for phones; all where the metric is chosen.
     heads = pages.page(client.get("/board/test/")).one("table", class_="board").all("th", scope="col")
     assert [head.text for head in heads if "AE" in head.text] == ["AEAE, overall, soveralls"]
     assert "Absolute TTC error (AE) s" in page_text(client, "/board/test/?columns=absolute")
