@@ -189,7 +189,8 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
     html = _CODE.sub(lambda code: _HYPHENED.sub(r'<span class="together">\g<0></span>', code[0]), html)
     html = _TABLE.sub(_framed, html)
     # The parser escapes what is no markup of its own.
-    return Document(SafeString(html), tuple(part for part in parts if part.heading.level or part.text))
+    drawn = SafeString(html)
+    return Document(drawn, tuple(part for part in parts if part.heading.level or part.text))
 
 
 def _draw_code(token: Token) -> None:

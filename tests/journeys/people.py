@@ -79,7 +79,7 @@ class Visitor:
 
     def text_of(self, path: str) -> str:
         """A page's words, without its markup."""
-        marked = re.sub(r"</?strong>", "", self.get(path).text)  # inside of a sentence
+        marked = re.sub(r"</?strong>|<wbr>", "", self.get(path).text)  # inside of a sentence or a word
         text = re.sub(r"<(script|style).*?</\1>|<[^>]+>", " ", marked, flags=re.DOTALL)
         return re.sub(r"\s+", " ", html.unescape(text))
 
