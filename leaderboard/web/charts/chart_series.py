@@ -57,8 +57,8 @@ def named_marks(name: str, front: Sequence[Mark], chosen: Iterable[int], look: L
     for item, after in itertools.pairwise(items):
         if item["name"] == after["name"]:  # a method that improves on itself is named at its best
             item["label"] = {"show": False}
-    places = [None, *([mark.x, mark.y] for mark in front), None]
-    beside = [[places[i], places[i + 2]] for i in indices]
+    corners = [None, *([mark.x, mark.y] for mark in front), None]
+    beside = [[corners[i], corners[i + 2]] for i in indices]
     series = marks(name, (), look, z=4)
     label = {
         **TEXT,

@@ -179,8 +179,8 @@ class NewSplitForm(PolicyForm):
         widget=forms.RadioSelect,
         initial="hidden",
         help_text=lazy(format_html, SafeString)(
-            'Leave a split with new ground truth switched off until you <a href="{}#splits-and-challenges">'
-            "import the ground truth</a>.",
+            "If the ground truth is new, keep the split switched off until you have "
+            '<a href="{}#splits-and-challenges">imported it</a>.',
             reverse_lazy("guide", args=["maintainers"]),
         ),
         error_messages={"required": "No ground truth was chosen; expected one of those listed."},
