@@ -47,7 +47,7 @@ class Numbering:
 def read_numbering(folder: str | Path, *, manifest: Manifest | None = None) -> Numbering:
     """Read how the toolkit numbers an annotation folder on this machine, compared with `manifest`.
 
-    Without `manifest`, the folder's own is made. Raises `Rejected` for an unreadable folder or different
+    Without `manifest`, one is made from the folder. Raises `Rejected` for an unreadable folder or different
     sequences.
     """
     folder = Path(folder)
