@@ -58,7 +58,7 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "duplicate-ids": "An anno_id appears more than once.",
     "duplicate-natural-keys": "A natural key appears more than once.",
     "truth-not-finite": "A true time to contact is NaN or infinite.",
-    "two-units": "A recording has two units; a unit, as a day, holds whole recordings.",
+    "two-units": "A recording has two units; a unit, such as a day, must contain whole recordings.",
     "truth-near-zero": "A true time to contact lies where the errors are undefined (−0.1 ≤ τ ≤ 0, or "
     "closer to 0 than 1e-200).",
     "no-overlap": "A correction has no sequence of the ground truth that it is to correct.",
