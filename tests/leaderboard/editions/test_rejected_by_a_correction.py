@@ -56,7 +56,7 @@ def test_publishing_is_refused_by_every_door_until_the_entries_are_left_out_know
     assert answer.status_code == 422
     form = assert_sound(answer)
     assert sentence in form.one("div", class_="form-errors").text
-    assert form.one("legend").text == "1 scored entry rejected"
+    assert form.one("legend").text == "1 scored submission rejected"
     assert "checked" not in form.one("input", name="leave_out").attributes
     assert Publication.objects.count() == 1
     assert keeper.post(PUBLISH, {**data, "leave_out": "on"}).status_code == 302
