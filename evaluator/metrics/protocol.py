@@ -236,7 +236,7 @@ ProtocolName = Literal["tsttc-1", "tsttc-2", "toolkit"]
 DEFAULT_PROTOCOL: Final = "tsttc-1"
 
 SCORE_NAMES: Final = PROTOCOLS[DEFAULT_PROTOCOL].score_names
-"""The scores of the default protocol; of an edition, ask its own."""
+"""The scores of the default protocol; an edition may have another protocol."""
 
 
 def get_protocol(name: str) -> Protocol:

@@ -126,7 +126,7 @@ class Predictions:
 def read_predictions(source: Source, *, manifest: Manifest, max_bytes: int | None = None) -> Predictions:
     """Read a prediction file and align it with `manifest`; raises `Rejected` with every fault.
 
-    `source` is a path, bytes or an open file of at most `max_bytes`, in any form of a prediction file. The
+    `source` is a path, bytes or an open file of at most `max_bytes` (None: no limit), in any form. The
     digest is that of the bytes, for a Parquet table that of its JSON form. Parquet needs pyarrow
     (`ModuleNotFoundError`).
     """

@@ -30,7 +30,7 @@ def confidence_intervals(
     protocol: ProtocolName | Protocol = DEFAULT_PROTOCOL,
     unit: UnitKind | None = None,
 ) -> dict[str, tuple[float, float] | None]:
-    """Compute the 95% interval of each score as the board shows it; None where there is none.
+    """Compute the 95% interval of each score as the board shows it; None if the board shows none.
 
     `unit` is recording, day or given; None takes `truth.manifest.units`. Raises `ValueError` for a unit that
     the recordings lack.

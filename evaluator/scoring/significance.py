@@ -47,12 +47,13 @@ class Influence:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """First minus second in one column: below 0 the first is better.
+    """First score minus second in one column: below 0, the first is better.
 
-    `low` and `high` are its 95% interval, `p` that of the two-sided sign-flip test; None for too few units.
-    `p_below` is the smallest of `P_CLASSES` above p, else 1; hidden splits show it alone. `n_effective` is
-    the effective number of units, `unit` their kind (recording, day or given), `influence` how few of them
-    decide.
+    `low` and `high` bound its 95% interval, and `p` is from the two-sided sign-flip test; all are None if
+    there are too few units.
+    `p_below` is the smallest of `P_CLASSES` above p, else 1; hidden splits show only this. `n_effective`
+    is the effective number of units, `unit` is their kind (recording, day or given), and `influence` says how
+    few of them decide.
     """
 
     difference: float

@@ -169,11 +169,10 @@ def _members(node: ast.ClassDef) -> Iterator[str]:
         if not isinstance(each, ast.FunctionDef) or each.name.startswith("_"):
             continue
         marks = {ast.unparse(mark).rpartition(".")[2] for mark in each.decorator_list}
-        call = each.name if marks & {"property", "cached_property"} else f"{each.name}{_call(each)}"
+        call = "" if marks & {"property", "cached_property"} else f"`{_call(each)}`"
         about = (ast.get_docstring(each) or "").partition("\n\n")[0].replace("\n", " ")
-        end = ": " if call == each.name else "\\\n  "  # a call has its own line
-        # An arrow of two signs would break between them on a phone.
-        lines.append(f"- `{call.replace(' -> ', ' → ')}`{end}{about}")
+        end = "\\\n  " if call else ": "  # a call has its own line
+        lines.append(f"- **`{each.name}`**{call}{end}{about}")
     yield from lines
     if lines:
         yield ""
@@ -200,7 +199,8 @@ def _call(node: ast.FunctionDef) -> str:
 
 
 def _result(node: ast.FunctionDef) -> str:
-    return f" -> {ast.unparse(node.returns)}" if node.returns else ""
+    # An arrow of two signs would break between them on a phone.
+    return f" → {ast.unparse(node.returns)}" if node.returns else ""
 
 
 def _arguments(node: ast.FunctionDef) -> list[str]:

@@ -16,7 +16,7 @@ ENTRIES = dict(re.findall(r"^### ([\w.]+)(?:\(\))?\n(.*?)(?=^##|\Z)", TEXT, re.M
 
 def test_every_public_name_is_there_with_words() -> None:
     expected = {f"evaluator.{name}" for name in evaluator.__all__ if name != "__version__"}
-    assert re.findall(r"^- `[^`]*`(?::|\\\n) *\n", TEXT, re.MULTILINE) == []
+    assert re.findall(r"^- \*\*`\w+`\*\*(?:`[^`]*`)?(?::|\\\n) *\n", TEXT, re.MULTILINE) == []
     for sections in python_reference.SECTIONS.values():
         for modules in sections.values():
             expected |= {f"{module}.{name}" for module, names in modules.items() for name in names}
