@@ -163,20 +163,23 @@ def _entry(name: str, module: str) -> Iterator[str]:
 
 
 def _members(node: ast.ClassDef) -> Iterator[str]:
-    """The public methods and properties of a class, as a list."""
-    lines = []
+    """The public methods and properties of a class, as two lists."""
+    groups: dict[str, list[str]] = {"Attributes": [], "Methods": []}
     for each in node.body:
         if not isinstance(each, ast.FunctionDef) or each.name.startswith("_"):
             continue
         marks = {ast.unparse(mark).rpartition(".")[2] for mark in each.decorator_list}
         call = each.name if marks & {"property", "cached_property"} else f"{each.name}{_call(each)}"
         about = (ast.get_docstring(each) or "").partition("\n\n")[0].replace("\n", " ")
-        end = ": " if call == each.name else "\\\n  "  # a call has its own line
+        is_value = call == each.name
+        end = ": " if is_value else "\\\n  "  # a call has its own line
         # An arrow of two signs would break between them on a phone.
-        lines.append(f"- `{call.replace(' -> ', ' → ')}`{end}{about}")
-    yield from lines
-    if lines:
-        yield ""
+        groups["Attributes" if is_value else "Methods"].append(
+            f"- `{call.replace(' -> ', ' → ')}`{end}{about}"
+        )
+    for title, lines in groups.items():
+        if lines:
+            yield from (f"{title}:", "", *lines, "")
 
 
 def _signature(node: _Definition) -> str:
