@@ -164,7 +164,7 @@ def _entry(name: str, module: str) -> Iterator[str]:
 
 def _members(node: ast.ClassDef) -> Iterator[str]:
     """The public methods and properties of a class, as two lists."""
-    groups: dict[str, list[str]] = {"Attributes": [], "Methods": []}
+    groups: dict[str, list[str]] = {"Properties": [], "Methods": []}
     for each in node.body:
         if not isinstance(each, ast.FunctionDef) or each.name.startswith("_"):
             continue
@@ -174,7 +174,7 @@ def _members(node: ast.ClassDef) -> Iterator[str]:
         is_value = call == each.name
         end = ": " if is_value else "\\\n  "  # a call has its own line
         # An arrow of two signs would break between them on a phone.
-        groups["Attributes" if is_value else "Methods"].append(
+        groups["Properties" if is_value else "Methods"].append(
             f"- `{call.replace(' -> ', ' → ')}`{end}{about}"
         )
     for title, lines in groups.items():
