@@ -121,13 +121,13 @@ class RankChangeSerializer(serializers.Serializer[RankChange]):
 
 
 class BoardPreviewSerializer(serializers.Serializer[BoardPreview]):
-    """The public board of one split as it would be."""
+    """A preview of one split's public board."""
 
     split = serializers.CharField(source="split.name", help_text=SPLIT)
     edition = serializers.IntegerField(source="edition.number", help_text=EDITION)
     n_ranked = serializers.IntegerField(help_text="Number of ranked rows that the board would have.")
     before = EntrySerializer(allow_null=True, help_text="The method's current public row, if any.")
-    after = EntrySerializer(source="entry", help_text="The method's public row as it would be.")
+    after = EntrySerializer(source="entry", help_text="The method's public row after the publication.")
     n_attempts_before = serializers.IntegerField(
         source="n_attempts_now",
         allow_null=True,

@@ -46,7 +46,8 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
 
     id = serializers.UUIDField(help_text="Permanent id of the submission.")
     state = serializers.ChoiceField(
-        choices=Status.choices, help_text="Final: SCORED, REJECTED, SYSTEM_ERROR (our fault), CANCELLED."
+        choices=Status.choices,
+        help_text="Final: SCORED, REJECTED, SYSTEM_ERROR (our fault; a maintainer can retry it), CANCELLED.",
     )
     split = serializers.CharField(help_text=SPLIT)
     edition = serializers.IntegerField(allow_null=True, help_text=EDITION)
@@ -67,7 +68,9 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
     withdrawn_at = serializers.DateTimeField(
         allow_null=True, help_text="When the team withdrew it; null: not withdrawn."
     )
-    is_final = serializers.BooleanField(help_text="Whether the state will not change any more.")
+    is_final = serializers.BooleanField(
+        help_text="Whether the state is final; only a maintainer or a new edition can change it."
+    )
     fault_is_ours = serializers.BooleanField(
         help_text="Whether scoring failed on our side, not because of the file."
     )

@@ -54,7 +54,7 @@ class WithdrawView(APIView):
         responses={200: SubmissionSerializer, **errors(404, 422)},
     )
     def post(self, request: Request, submission_id: str) -> Response:
-        """Cancel a waiting or withdraw a scored submission, for good. A public row stays, without values."""
+        """Permanently cancel a waiting submission or withdraw a scored one. A public row keeps no values."""
         submission = get_object_or_404(visible(request), pk=submission_id)
         now = timezone.now()
         intake.withdraw(submission=submission, actor=cast("User", request.user), now=now)

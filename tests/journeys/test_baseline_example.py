@@ -31,7 +31,7 @@ def test_the_example_goes_from_frames_to_a_row_in_four_commands(
     owner = User.objects.create_user("owner@example.org", "correct horse", name="Owls")
     ground_truth.import_truth(split_name="val", path=EXAMPLES / "baseline" / "truth.csv", now=timezone.now())
     tsttc = command(live_server.url, builders.token(owner), home=tmp_path)
-    run, check, score, submit = commands_of("Four commands")
+    run, check, score, submit = commands_of("Run, check, score, submit")
     replacements = {"examples/baseline": "baseline", "alignment.json": str(tmp_path / "alignment.json")}
 
     def here(arguments: list[str]) -> list[str]:

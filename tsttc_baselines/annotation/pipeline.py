@@ -81,7 +81,7 @@ class Annotation:
 def annotate(
     tracks: Tracks, *, cut: Cut = "toolkit", depth: Depth = "checked", inlier_m: float = INLIER_M
 ) -> Annotation:
-    """Make ground truth from tracks (paper, 4.2); raises `Rejected` if no sequence remains.
+    """Create ground truth from tracks (paper, 4.2); raises `Rejected` if no sequence remains.
 
     `cut` is the toolkit's (no overlap) or "overlapping" (every six successive frames); `depth` is that of
     `frame_ttc`.

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tsttc_baselines.annotation.tracks import Tracks
 
 
-@click.command(short_help="Make ground truth from tracks of 3D boxes.")
+@click.command(short_help="Create ground truth from tracks of 3D boxes.")
 @click.argument("source", metavar="TRACK.csv|FOLDER", type=TABLE)
 @out_option("Write the ground truth to this file.", name="--output", metavar="TRUTH.csv")
 @default_option(
@@ -67,7 +67,7 @@ def annotate(
     boxes: Path | None,
     as_json: bool,
 ) -> None:
-    """Make ground truth from TRACK.csv, a table of 3D boxes, or with --format kitti from a FOLDER of labels.
+    """Create ground truth from TRACK.csv, a table of 3D boxes, or with --format kitti from a FOLDER.
 
     Distance is that of the nearest corner of the box; its velocity comes from the past 3, 5 and 10 frames.
     Where these differ, the one nearest to the radar's velocity counts. The file has a column for the choice.

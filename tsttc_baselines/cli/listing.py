@@ -20,7 +20,7 @@ from tsttc_baselines.own_methods import MethodMissing, find_method, is_own, poin
 def list_methods(*, as_json: bool) -> None:
     """List the methods that `tsttc baseline run` knows, with their parameters and defaults.
 
-    "as published" names the parameters of a published row; "unpublished" is a method that no paper has.
+    "as published" names the parameters of a published row; an "unpublished" method appears in no paper.
     Installed packages may add methods, by entry points of `tsttc.methods`.
 
     \b

@@ -31,7 +31,7 @@ FILES: Final = {
 """The files of the package, each with its template; both have "my-method" and "my_method" for the name."""
 
 
-@click.command("new-method", short_help="Write a package to begin a method of your own with.")
+@click.command("new-method", short_help="Create a starter package for your own method.")
 @click.argument("name", metavar="NAME")
 @json_option
 def new_method(*, name: str, as_json: bool) -> None:

@@ -163,8 +163,8 @@ def _entry(name: str, module: str) -> Iterator[str]:
 
 
 def _members(node: ast.ClassDef) -> Iterator[str]:
-    """The public methods and properties of a class, as a list."""
-    lines = []
+    """The public methods and properties of a class, as two lists."""
+    groups: dict[str, list[str]] = {"Properties": [], "Methods": []}
     for each in node.body:
         if not isinstance(each, ast.FunctionDef) or each.name.startswith("_"):
             continue
@@ -172,10 +172,10 @@ def _members(node: ast.ClassDef) -> Iterator[str]:
         call = "" if marks & {"property", "cached_property"} else f"`{_call(each)}`"
         about = (ast.get_docstring(each) or "").partition("\n\n")[0].replace("\n", " ")
         end = "\\\n  " if call else ": "  # a call has its own line
-        lines.append(f"- **`{each.name}`**{call}{end}{about}")
-    yield from lines
-    if lines:
-        yield ""
+        groups["Methods" if call else "Properties"].append(f"- **`{each.name}`**{call}{end}{about}")
+    for title, lines in groups.items():
+        if lines:
+            yield from (f"{title}:", "", *lines, "")
 
 
 def _signature(node: _Definition) -> str:
