@@ -287,12 +287,12 @@ def latency(entries: Sequence[Entry], *, metric: Metric) -> Chart:
         _with_front(
             (
                 latency_ms,
-                entry.value or 0.0,
+                value,
                 entry,
                 f"{latency_ms:g} ms on {entry.details['hardware'] or 'unknown hardware'}",
             )
             for entry in ranked
-            if (latency_ms := entry.details["latency_ms"]) is not None
+            if (latency_ms := entry.details["latency_ms"]) is not None and (value := entry.value) is not None
         ),
         metric,
     )

@@ -189,7 +189,7 @@ EXAMPLES: Final[Mapping[str, Example]] = {
             has_file=True,
         ),
         _send("POST", "submissions", form=_FORM),
-        'tsttc submit predictions.json --split val --method "Deep TTC" --wait',
+        'tsttc submit predictions.json --split val --method "Deep TTC" \\\n  --note "lr 1e-4" --wait',
         'client.submit("predictions.json", split="val", method="Deep TTC")',
     ),
     "withdraw": Example(
