@@ -26,6 +26,16 @@ _CHAPTERS_OF_API: Final = [
     TextHeading(2, "Problem codes", "problems"),
     TextHeading(2, "Objects", "shapes"),
 ]
+_CHAPTERS_AT_A_GLANCE: Final = [
+    TextHeading(2, "Submit in four steps", "submit"),
+    TextHeading(2, "The prediction file", "format"),
+    TextHeading(2, "What is rejected", "problems"),
+    TextHeading(2, "Metrics and TTC ranges", "metrics"),
+    TextHeading(2, "Protocol", "scoring"),
+    TextHeading(2, "Uncertainty", "uncertainty"),
+    TextHeading(2, "What is published", "published"),
+    TextHeading(2, "API", "api"),
+]
 
 
 def _navigation(address: str) -> list[tuple[str, list[GuideLink], bool]]:
@@ -41,6 +51,7 @@ def _navigation(address: str) -> list[tuple[str, list[GuideLink], bool]]:
 def docs(request: HttpRequest) -> HttpResponse:
     facts = reference.docs(splits_of(request), now=timezone.now())
     context = {"navigation": _navigation(request.path), "wheel": wheels.current(), **facts}
+    context["guide"] = {"chapters": _CHAPTERS_AT_A_GLANCE}
     return render(request, "docs/docs.html", context)
 
 

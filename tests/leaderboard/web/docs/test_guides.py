@@ -145,3 +145,13 @@ def test_the_first_page_names_a_split_that_is_open_or_says_that_none_is(
 def test_where_no_part_has_all_words_those_with_some_are_shown() -> None:
     assert search.find("quota xyzzyq")
     assert search.find("xyzzyq") == []
+
+
+def test_a_page_of_several_sections_lists_them_and_each_link_has_its_heading(
+    client: Client, benchmark: None
+) -> None:
+    for address in ("/docs/", "/docs/api/", "/docs/scoring/", "/docs/cli/"):
+        page = pages.get(client, address)
+        nav = next(e for e in page.all("nav") if e.attributes["aria-label"] == "On this page")
+        sections = [f"#{e.attributes['id']}" for e in page.all("h2") if "id" in e.attributes]
+        assert [a.attributes["href"] for a in nav.all("a")] == sections
