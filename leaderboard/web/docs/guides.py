@@ -53,6 +53,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
     "For maintainers": {
         "Quick start for maintainers": "hosting",
         "Maintenance": "maintainers",
+        "Backups and upgrades": "backups",
         "Operations": "operations",
         "Settings": "settings",
         "Host another dataset": "another-dataset",
