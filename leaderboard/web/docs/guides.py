@@ -62,7 +62,12 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Hidden values": "hidden-values",
         "Reliability": "reliability",
     },
-    "For developers": {"Overview": "overview", "Architecture": "architecture", "Decisions": "decisions"},
+    "For developers": {
+        "Overview": "overview",
+        "Architecture": "architecture",
+        "Extending": "extending",
+        "Decisions": "decisions",
+    },
 }
 # Pages that a guide names by their paths, and that anybody may ask for.
 _PAGES: Final = frozenset(

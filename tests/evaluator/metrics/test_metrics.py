@@ -25,7 +25,7 @@ times = st.floats(0.2, 20) | st.floats(-20, -0.2)
 @every_metric
 def test_an_error_is_one_sequences_own(metric: Metric) -> None:
     errors = metric.errors(PREDICTED_S, TRUE_S)
-    message = "a score is the mean of the sequences' errors, so a median is no metric: docs/architecture.md"
+    message = "a score is the mean of the sequences' errors, so a median is no metric: docs/extending.md"
     assert errors.shape == TRUE_S.shape, message
     alone = [float(metric.errors(p, t)) for p, t in zip(PREDICTED_S, TRUE_S, strict=True)]
     assert errors.tolist() == pytest.approx(alone, rel=1e-12, abs=0), message
