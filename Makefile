@@ -27,46 +27,46 @@ export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help demo demo-runs test test-fast test-torch chaos bench lint format screenshots release lock echarts clean
 
-help: ## list what can be made
+help: ## list these commands
 	@awk -F ' ## ' '/^[a-z-]+:.* ## / { sub(/:.*/, "", $$1); printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(READY) ## the leaderboard with simulated data on http://127.0.0.1:8000 (PORT=… for another port)
 	@exec $(PY) manage.py demo --host $(HOST) --port $(PORT)
 
-demo-runs: $(DEV_STAMP) ## make the submissions of the demo anew from rendered frames (RUNS="tracking pixel-mse" for some)
+demo-runs: $(DEV_STAMP) ## run the demo's baselines again on rendered frames (RUNS="tracking pixel-mse" for some)
 	PATH="$(abspath $(VENV))/bin:$$PATH" nice -n 10 $(PY) -m leaderboard.demo.runs build/demo-runs $(RUNS)
 
-test: lint ## lint, then the whole test suite; parts that lack a service say so
+test: lint ## lint, then all tests; says which services are missing
 	@$(PY) -m tests.everything
 
-test-fast: $(DEV_STAMP) ## what takes about a minute: no services, no browser, nothing slow
+test-fast: $(DEV_STAMP) ## tests of about a minute: no services, no browser, nothing slow
 	$(PY) -m pytest -q $(SPREAD) -m "not slow and not services and not browser"
 
 test-torch: $(DEV_STAMP) $(TORCH_STAMP) ## the tests that need torch, in an environment of their own (.venv-torch)
 	@$(TORCH_VENV)/bin/python -c 'import lightning, torch, torchmetrics; print("torch", torch.__version__)'
 	OMP_NUM_THREADS=1 $(TORCH_VENV)/bin/python -m pytest -q $(SPREAD) -m torch tests/evaluator tests/tsttc_baselines
 
-chaos: $(DEV_STAMP) ## 200 uploads while everything that can fail does; says what was lost, doubled or stuck
+chaos: $(DEV_STAMP) ## 200 uploads while services fail; counts lost, doubly scored and stuck files
 	@$(PY) -m tests.chaos
 
-bench: $(DEV_STAMP) ## measure the figures of docs/capacity.md, and say which hold
+bench: $(DEV_STAMP) ## measure the figures of docs/capacity.md and compare them with their targets
 	@$(PY) -m benchmarks
 
-lint: $(DEV_STAMP) ## style, types, the direction of imports, and a migration for every change of a table
+lint: $(DEV_STAMP) ## check style, types, import layers and migrations
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy .
 	$(VENV)/bin/lint-imports
 	$(PY) manage.py makemigrations --check --dry-run
 
-format: $(DEV_STAMP) ## put the code into the house's format
+format: $(DEV_STAMP) ## format the code
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
-screenshots: $(DEV_STAMP) ## photograph the demo for the README, into docs/screenshots/
+screenshots: $(DEV_STAMP) ## take the README's screenshots of the demo, into docs/screenshots/
 	$(PY) -m tests.browser.screenshots
 
-release: ## build wheel and sdist of REF (default HEAD), check them as their users will, print the digests
+release: ## build wheel and sdist of REF (default HEAD), check them, print their digests
 	@deploy/release.sh $(REF)
 
 # Universal: one file for every platform and Python; hashes, and no index host. Existing pins stay unless
@@ -74,7 +74,7 @@ release: ## build wheel and sdist of REF (default HEAD), check them as their use
 LOCK := $(VENV)-lock/bin/uv pip compile pyproject.toml --extra pandas --group server --group build \
 	--universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --quiet $(UPGRADE)
 
-lock: ## pin the dependencies of pyproject.toml anew
+lock: ## update the lock files from pyproject.toml
 	@$(call find_python) && "$$python" -m venv $(VENV)-lock && $(VENV)-lock/bin/python -m pip install --quiet uv
 	$(LOCK) --output-file requirements.lock
 	$(LOCK) --extra baselines --extra plots --extra parquet --group dev --constraint requirements.lock --output-file requirements-dev.lock
@@ -84,7 +84,7 @@ lock: ## pin the dependencies of pyproject.toml anew
 ECHARTS := 6.1.0
 ESBUILD := 0.28.2
 
-echarts: ## build static/vendored/echarts.min.js anew (ECHARTS=… for another version)
+echarts: ## rebuild static/vendored/echarts.min.js (ECHARTS=… for another version)
 	@folder=$$(mktemp -d) && trap 'rm -rf "$$folder"' EXIT && \
 	npm install --prefix "$$folder" --ignore-scripts --no-audit --no-fund --silent echarts@$(ECHARTS) esbuild@$(ESBUILD) && \
 	cp static/vendored/echarts.entry.txt "$$folder/entry.mjs" && \
