@@ -20,6 +20,9 @@ INSTEAD = {
     "may well be": "not significant",
     "take along": "export",
     "take it along": "export",
+    "for ever": "permanently, forever",
+    "in silence": "silently",
+    "the house": "the project",
     "taken along": "exported",
     "what is said": "details",
     "what teams say": "details",
@@ -55,7 +58,9 @@ INSTEAD = {
 _BANNED = re.compile(rf"\b({'|'.join(map(re.escape, INSTEAD))})\b", re.IGNORECASE)
 
 PAGES = sorted((REPOSITORY / "templates").rglob("*.html"))
-GUIDES = sorted((*(REPOSITORY / "docs").glob("*.md"), REPOSITORY / "README.md", REPOSITORY / "SECURITY.md"))
+GUIDES = sorted(
+    (*(REPOSITORY / "docs").rglob("*.md"), *REPOSITORY.glob("*.md"), REPOSITORY / "examples" / "README.md")
+)
 MESSAGES = sorted(
     path
     for room in ("evaluator", "tsttc_baselines", "leaderboard")
