@@ -3,7 +3,8 @@
 Most answer without the database. Long pages are compressed here: not every site has a proxy that does so.
 """
 
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
 
 from django.http import FileResponse, Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import render
@@ -81,6 +82,17 @@ def find(request: HttpRequest) -> HttpResponse:
     return render(request, "docs/search.html", context)
 
 
+def _chapters(operation: Mapping[str, Any]) -> list[TextHeading]:
+    parameters = "Parameters and body" if operation["bodies"] else "Parameters"
+    return [
+        TextHeading(2, "Request", "request"),
+        TextHeading(3, parameters, "parameters"),
+        TextHeading(2, "Response", "answer"),
+        *([TextHeading(2, "Fields", "fields")] if operation["objects"] else []),
+        TextHeading(2, "Errors", "errors"),
+    ]
+
+
 @gzip_page
 @require_safe
 def api_operation(request: HttpRequest, operation_id: str) -> HttpResponse:
@@ -90,6 +102,7 @@ def api_operation(request: HttpRequest, operation_id: str) -> HttpResponse:
         raise Http404(f"There is no operation {operation_id!r}.")
     context = {
         "navigation": _navigation(reverse("api_reference")),
+        "guide": {"chapters": _chapters(operation)},
         "operation": operation,
         "example": api_examples.shown(operation_id),
         "above": reverse("api_reference"),
