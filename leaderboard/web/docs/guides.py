@@ -38,6 +38,7 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "CI": "ci",
         "API guide": "api-guide",
         "API reference": "",
+        "Problem codes": "problem-codes",
         "Exports": "exports",
         "Teams, quotas, tokens": "access",
         "FAQ": "faq",

@@ -90,7 +90,7 @@ def search_hits(client: Client, query: str) -> list[tuple[str, str]]:
     ("query", "address"),
     [
         ("quota", "/docs/access/#quotas"),
-        ("quota-exceeded", "/docs/api-guide/#rates-and-quotas"),
+        ("quota-exceeded", "/docs/problem-codes/#rates-and-quotas"),
         ("bootstr", "/docs/uncertainty/"),
         ("how to submit", "/docs/cli/#submit"),
         ("how to get an API token", "/docs/access/#tokens"),
