@@ -24,9 +24,9 @@ def _protocol_words(protocol: Protocol) -> str:
     """Tell protocols apart.
 
     >>> _protocol_words(PROTOCOLS["tsttc-2"]), _protocol_words(PROTOCOLS["toolkit"])
-    ('MiD, RTE, WE; truncates predictions near 0', 'MiD, RTE; rejects a file if a prediction has no MiD')
+    ('MiD, RTE, WE; truncates predictions near 0', 'MiD, RTE; rejects a file with an undefined MiD')
     """
-    rejects = "rejects a file if a prediction has no MiD"
+    rejects = "rejects a file with an undefined MiD"
     near_zero = "truncates predictions near 0" if protocol.near_zero_s else rejects
     return f"{', '.join(metric.symbol for metric in protocol.metrics)}; {near_zero}"
 
