@@ -66,7 +66,7 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "forbidden-pickle": "A pickle asks for something other than plain containers, numbers and arrays.",
     "bad-annotations": "An annotation file is not structured like the toolkit's.",
 }
-"""Every code with what it means."""
+"""The meaning of every problem of a file, by its code."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ WARNING_CODES: Final[dict[str, str]] = {
     "unlike-truth": "The predictions do not match the true times, or have the opposite sign.",
     "other-numbering": "The toolkit numbers the sequences of a folder differently on this machine.",
 }
-"""Every code of a warning with what it means."""
+"""The meaning of every warning, by its code."""
 
 
 class Rejected(Exception):

@@ -45,9 +45,10 @@ def convert(
     """Convert a prediction file to the unit `to`.
 
     A flat file has seconds, or scale ratios at `fps_hz` or `frame_gap`; an envelope states its unit. Scale
-    ratios are written at `to_fps_hz` or `to_frame_gap`, by default 2 Hz (gap 5). Keys stay, unless
-    `natural_keys` maps exactly the file's anno_ids to natural keys. Raises `Rejected` for what no prediction
-    file may hold, `ValueError` for rates that do not fit together.
+    ratios are written at `to_fps_hz` or `to_frame_gap`, by default 2 Hz (gap 5). With
+    `natural_keys`, natural keys by anno_id, the keys become natural keys; otherwise they stay. Raises
+    `Rejected` for a file with faults or with other anno_ids than `natural_keys`, and `ValueError` for an
+    impossible rate or more than one.
     """
     document = read_document(parse(json_of(as_sent(data_of(source)))))
     _require_one_rate(document, fps_hz, frame_gap)

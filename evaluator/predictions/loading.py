@@ -127,8 +127,8 @@ def read_predictions(source: Source, *, manifest: Manifest, max_bytes: int | Non
     """Read a prediction file and align it with `manifest`; raises `Rejected` with every fault.
 
     `source` is a path, bytes or an open file of at most `max_bytes` (None: no limit), in any form. The
-    digest is that of the bytes, for a Parquet table that of its JSON form. Parquet needs pyarrow
-    (`ModuleNotFoundError`).
+    digest is that of the bytes; for a Parquet table, that of its JSON form. Raises `ModuleNotFoundError` for
+    a Parquet table without pyarrow.
     """
     require(manifest, Manifest, name="manifest")
     data = data_of(source)

@@ -52,8 +52,8 @@ class Difference:
     `low` and `high` bound its 95% interval, and `p` is from the two-sided sign-flip test; all are None if
     there are too few units.
     `p_below` is the smallest of `P_CLASSES` above p, else 1; hidden splits show only this. `n_effective`
-    is the effective number of units, `unit` is their kind (recording, day or given), and `influence` says how
-    few of them decide.
+    is the effective number of units, `unit` is their kind (recording, day or given), and `influence` has
+    the numbers of units without which the difference is not significant, or has the other sign.
     """
 
     difference: float

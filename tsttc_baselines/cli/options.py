@@ -34,7 +34,7 @@ def jobs_option(command: Command) -> Command:
         "n_processes",
         type=click.IntRange(1, 1024),
         default=n_cores,
-        help="Processes. [default: one for each processor]",
+        help="Processes. [default: one for each CPU core]",
     )(command)
 
 
