@@ -56,6 +56,23 @@ def test_board_fits_every_screen_with_names_of_80_letters_and_its_heads_stay(
     expect(page.get_by_text("would be")).to_have_count(1)
 
 
+def test_an_open_menu_stays_in_the_window(new_page: NewPage, board: None) -> None:
+    page = new_page()
+    sign_in(page, BOARD_OWNER)
+    faults = []
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 800})
+        page.goto(BOARD)
+        for name in ("History", "Export"):
+            page.locator(".menu > summary", has_text=name).click()
+            body = page.locator(".menu[open] > .menu-body").bounding_box()
+            assert body is not None
+            if body["x"] < 0 or body["x"] + body["width"] > width or page.evaluate(OVERFLOW_PX):
+                faults.append(f"{width}: {name} {body}")
+            page.keyboard.press("Escape")
+    assert faults == []
+
+
 def test_phone_shows_one_range_and_the_visitor_chooses_which(new_page: NewPage, board: None) -> None:
     page = new_page(viewport=NARROW)
     page.goto(BOARD)
