@@ -92,6 +92,7 @@ def search_hits(client: Client, query: str) -> list[tuple[str, str]]:
         ("quota", "/docs/access/#quotas"),
         ("quota-exceeded", "/docs/problem-codes/#rates-and-quotas"),
         ("bootstr", "/docs/uncertainty/"),
+        ("truncation", "/docs/scoring/#protocols"),
         ("how to submit", "/docs/cli/#submit"),
         ("how to get an API token", "/docs/access/#tokens"),
         ("what is an edition", "/docs/editions/"),
