@@ -20,7 +20,8 @@ _WORD: Final = re.compile(r"[^\W_]+")
 # A longer word also finds what begins with it: "quot" finds "quota", but "to" does not find "token".
 _MAX_SHORT: Final = 3
 # Its ending does not count: "truncation" finds "truncated".
-_ENDING: Final = re.compile(r"(?<=[^\W_]{4})(?:ations?|ions?|ings?|ed|es?|(?<!s)s)$")
+_ENDINGS: Final = r"(?:(?:at)?(?:ions?|ings?|e[ds]?)|(?<!s)s)"
+_ENDING: Final = re.compile(rf"(?<=[^\W_]{{4}}){_ENDINGS}$")
 _FILLERS: Final = frozenset(
     _WORD.findall(
         "a an and are be by can do does for from get have how i if in is it me my of on or that the there "
@@ -77,10 +78,11 @@ def _score(heading: str, title: str, asked: list[re.Pattern[str]]) -> float:
 
 
 def _pattern(word: str, *, is_exact: bool = False) -> re.Pattern[str]:
-    if len(word) > _MAX_SHORT and not is_exact:
-        beginning, end = _ENDING.sub("", word), r"[^\W_]*"
+    beginning = _ENDING.sub("", word)
+    if len(word) <= _MAX_SHORT:
+        end = r"(?:e?s)?(?![^\W_])"
     else:
-        beginning, end = word, r"(?:e?s)?(?![^\W_])"
+        end = rf"{_ENDINGS}?(?![^\W_])" if is_exact else r"[^\W_]*"
     return re.compile(rf"(?<![^\W_]){re.escape(beginning)}{end}", re.IGNORECASE)
 
 
