@@ -19,6 +19,9 @@ _REFERENCES: Final = frozenset({"cli", *python_reference.SECTIONS})
 _WORD: Final = re.compile(r"[^\W_]+")
 # A longer word also finds what begins with it: "quot" finds "quota", but "to" does not find "token".
 _MAX_SHORT: Final = 3
+# Its ending does not count: "truncation" finds "truncated".
+_ENDINGS: Final = r"(?:(?:at)?(?:ions?|ings?|e[ds]?)|(?<!s)s)"
+_ENDING: Final = re.compile(rf"(?<=[^\W_]{{4}}){_ENDINGS}$")
 _FILLERS: Final = frozenset(
     _WORD.findall(
         "a an and are be by can do does for from get have how i if in is it me my of on or that the there "
@@ -75,8 +78,12 @@ def _score(heading: str, title: str, asked: list[re.Pattern[str]]) -> float:
 
 
 def _pattern(word: str, *, is_exact: bool = False) -> re.Pattern[str]:
-    end = r"[^\W_]*" if len(word) > _MAX_SHORT and not is_exact else r"(?:e?s)?(?![^\W_])"
-    return re.compile(rf"(?<![^\W_]){re.escape(word)}{end}", re.IGNORECASE)
+    beginning = _ENDING.sub("", word)
+    if len(word) <= _MAX_SHORT:
+        end = r"(?:e?s)?(?![^\W_])"
+    else:
+        end = rf"{_ENDINGS}?(?![^\W_])" if is_exact else r"[^\W_]*"
+    return re.compile(rf"(?<![^\W_]){re.escape(beginning)}{end}", re.IGNORECASE)
 
 
 def _snippet(part: Part, asked: list[re.Pattern[str]]) -> SafeString:

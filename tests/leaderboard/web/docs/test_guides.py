@@ -112,6 +112,13 @@ def test_what_explains_a_word_comes_first_and_longer_words_with_its_beginning_la
     assert not [text for _, text in hits[:5] if "quotation" in text]
 
 
+@pytest.mark.parametrize("query", ["truncate", "truncated", "truncates", "truncation"])
+def test_every_form_of_a_word_finds_the_part_that_explains_it(
+    client: Client, benchmark: None, query: str
+) -> None:
+    assert "/docs/scoring/#protocols" in [href for href, _ in search_hits(client, query)[:3]]
+
+
 def test_the_words_asked_for_are_marked_and_are_never_markup(client: Client, benchmark: None) -> None:
     assert "<mark>quota</mark>" in client.get("/docs/search/?q=quota").text
     for query in ("<script>alert(1)</script>", '"><img src=x>', "\x00", "%", "(" * 50):
