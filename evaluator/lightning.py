@@ -21,8 +21,8 @@ except ModuleNotFoundError as missing:
 class ScoreCallback(Callback):  # type: ignore[misc]  # of an extra, which mypy skips
     """Logs `tsttc/mid`, `tsttc/mid_crucial`, … after each validation, with any precision and device count.
 
-    The arguments are those of `ScoreMetric`, which is `metric`. The model's `validation_step` returns a dict
-    with the arguments of its `update`: `{"rows": …, "ttc_s": …}` or
+    The arguments are those of `ScoreMetric`; the attribute `metric` is that object. The model's
+    `validation_step` returns a dict with the arguments of `ScoreMetric.update`: `{"rows": …, "ttc_s": …}` or
     `{"rows": …, "scale_ratio": …, "frame_gap": 5}`. Of several validation loaders only the first is scored.
     """
 

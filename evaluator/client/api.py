@@ -68,7 +68,7 @@ def _proxy_of(url: str) -> str:
 class Client:
     """A connection to one leaderboard. `timeout_s` bounds a request together with its repetitions.
 
-    What the server asks to wait for in `Retry-After` is not counted.
+    Waiting times that the server asks for in `Retry-After` are not counted.
     """
 
     url: str

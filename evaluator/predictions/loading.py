@@ -112,7 +112,7 @@ class Predictions:
         return cls.from_dict(seconds, manifest=manifest)
 
     def subset(self, rows: ArrayLike) -> Predictions:
-        """Return those of some sequences; raises as `GroundTruth.subset`."""
+        """Return the predictions of some sequences; raises the same errors as `GroundTruth.subset`."""
         chosen = np.asarray(rows)
         return Predictions.from_arrays(ttc_s=self.ttc_s[chosen], manifest=self.manifest.subset(chosen))
 

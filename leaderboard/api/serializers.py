@@ -72,7 +72,7 @@ class NamedSerializer(serializers.Serializer[Any]):
 
 
 def _sequences(ttc_range: TTCRange | None) -> str:
-    return f"those with {ttc_range.condition}" if ttc_range else "all sequences"
+    return f"sequences with {ttc_range.condition}" if ttc_range else "all sequences"
 
 
 class ScoresSerializer(NamedSerializer):
@@ -80,7 +80,7 @@ class ScoresSerializer(NamedSerializer):
 
     def child(self, name: str, **options: Any) -> serializers.FloatField:
         metric, of = metric_of(name), _sequences(range_of(name))
-        text = f"{metric.title} ({metric.unit}), mean over {of}; lower is better; null: there are none."
+        text = f"{metric.title} ({metric.unit}), mean over {of}; lower is better; null: no such sequences."
         return serializers.FloatField(allow_null=True, help_text=text, **options)
 
 
@@ -155,7 +155,7 @@ class QuotaSerializer(SlotsSerializer):
         allow_null=True,
         help_text="Rejected and cancelled files accepted per 24 hours; null: no limit.",
     )
-    sentence = serializers.CharField(help_text="The same as a sentence.")
+    sentence = serializers.CharField(help_text="The remaining quota in one sentence.")
 
 
 class AccountSerializer(serializers.Serializer[Any]):
@@ -285,8 +285,8 @@ class EntrySerializer(serializers.Serializer[Entry]):
         allow_null=True, help_text="By the first of the published scores, shared by ties; null: it has none."
     )
     id = serializers.CharField(
-        help_text="Names this row for good: the method's id, or of a quoted row `published:` and its short "
-        "name, as `published:deep-scale`."
+        help_text="Permanent id of the row: the method's id; for a quoted row `published:` and its short "
+        "name, such as `published:deep-scale`."
     )
     method = serializers.CharField(help_text="Name of the method.")
     method_id = serializers.UUIDField(allow_null=True, help_text=METHOD_ID)

@@ -95,7 +95,7 @@ EXAMPLES: Final[Mapping[str, Example]] = {
     "board": Example(
         _get("splits/val/board", ("sort", "rte"), ("intervals", "1")),
         _get("splits/val/board", ("sort", "speed")),
-        "tsttc board val --sort rte",
+        "tsttc board val --sort rte --intervals",
         'client.board("val", sort="rte", has_intervals=True)',
     ),
     "changelog": Example(
