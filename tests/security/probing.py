@@ -1,7 +1,7 @@
 """What one more submission tells of hidden labels, with two decimals and with the one that is published.
 
-    python -m tests.security.probing          the table of docs/hidden-values.md, some minutes
-    python -m tests.security.probing --quick  a small one
+    python -m tests.security.probing --readouts 6  the table of docs/hidden-values.md, some minutes
+    python -m tests.security.probing --quick       a small one
 
 File 0 predicts ln α10 = 0.6 for every sequence. That is above every true value, so MiD is linear in what is
 predicted: moving one prediction moves the mean of one range by a known amount, and of no other. File 1 moves

@@ -1,7 +1,7 @@
 """What one more submission tells of one hidden value: the time to contact itself, not only its range.
 
-    python -m tests.security.probing_values          the table of docs/hidden-values.md, about a minute
-    python -m tests.security.probing_values 200      with so many readouts of each row
+    python -m tests.security.probing_values 4000     the table of docs/hidden-values.md, about a minute
+    python -m tests.security.probing_values          with 2,000 readouts of each row
 
 File 0 predicts 0.05 s for one sequence and file 1 predicts 20 s (-0.15 s and -20 s where the object moves
 away); all else is equal. A true value between the two moves both errors by an amount that depends on it, and
