@@ -29,7 +29,8 @@ def references(entries: Iterable[Entry], *, of_board: str = "") -> Iterator[str]
     yield from filter(None, (paper.bibtex_entry if paper else "", of_board))
     bibtex_by_key = {paper.bibtex_key: ""} if paper else {}
     for entry in entries:
-        if entry.withdrawn_at is None and (entry.source_title or entry.paper_url):
+        has_paper = entry.source_title or _own_paper(entry)
+        if entry.withdrawn_at is None and has_paper:
             bibtex_by_key.setdefault(key_of(entry), of_entry(entry))
     yield from filter(None, bibtex_by_key.values())
 
@@ -63,22 +64,29 @@ def key_of(entry: Entry) -> str:
     return f"{name}-{entry.method_id.hex[:6] if entry.method_id else ''}"
 
 
-def of_entry(entry: Entry, *, page: str = "") -> str:
-    """Cite a row: its team and paper; a method without a paper by its `page`."""
+def of_entry(entry: Entry, *, page: str = "", edition: Edition | None = None) -> str:
+    """Cite a row: its team and paper; a method without a paper of its own by its `page`."""
     if entry.kind == "published":
         year = str(entry.year or "")
         return _paper(key_of(entry), entry.source_title, entry.team, year, entry.paper_url)
     mark = layouts.mark_of(visibility=entry.visibility, pseudonym=entry.pseudonym)
+    edition_facts = [f"{edition.split_id}, edition {edition.number}"] if edition else []
     return _entry(
         key_of(entry),
         {
             "title": f"{{{latex(entry.method)}}}",
             "author": f"{{{latex(entry.team)}}}",
             "year": f"{entry.date:%Y}" if entry.date else "",
-            **_address(entry.paper_url or page),
-            "note": layouts.marked(latex(settings.BENCHMARK.site_name), mark),
+            **_address(_own_paper(entry) or page),
+            "note": layouts.marked(latex(", ".join([settings.BENCHMARK.site_name, *edition_facts])), mark),
         },
     )
+
+
+def _own_paper(entry: Entry) -> str:
+    """Return the address of the team's paper. The benchmark's is not: others wrote it, and it has its own entry."""
+    paper = settings.BENCHMARK.paper
+    return "" if paper and entry.paper_url == paper.url else entry.paper_url
 
 
 def _paper(key: str, title: str, authors: str, year: str, url: str) -> str:

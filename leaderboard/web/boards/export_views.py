@@ -122,7 +122,7 @@ def of_method(results: Sequence[Result]) -> dict[str, str]:
         return {}
     page = settings.SITE_URL + reverse("method", args=[first.entry.method_id])
     return {
-        "bibtex": bibtex.of_entry(first.entry, page=page),
+        "bibtex": bibtex.of_entry(first.entry, page=page, edition=first.edition),
         "eval_result": "\n".join(eval_results.of_entry(first.entry, edition=first.edition)),
         "badge_split": first.split.pk,
     }

@@ -214,6 +214,19 @@ def test_bibtex_has_no_unbalanced_brace_and_no_key_twice(hostile: list[Method], 
     assert "ground truth sha256:" in board
 
 
+def test_a_team_is_not_cited_as_author_of_the_benchmarks_paper(
+    edition: Edition, owner: User, client: Client
+) -> None:
+    method, *_ = board_rows.fill(edition, n=1, user=owner)
+    Method.objects.filter(pk=method.pk).update(paper_url="https://arxiv.org/abs/2309.01539")
+    assert text_of(client, "bib").count("eprint = {2309.01539}") == 1
+    page = client.get(f"/methods/{method.pk}/").text
+    citation = page.partition(f"-{method.pk.hex[:6]},\n")[2].partition("\n}")[0]
+    assert f"/methods/{method.pk}/}}" in citation
+    assert "test, edition 1}" in citation
+    assert "eprint" not in citation
+
+
 @pytest.fixture
 def pdflatex() -> str:
     """The TeX that Debian calls texlive-latex-base; CI has it."""
