@@ -84,7 +84,7 @@ def of_entry(entry: Entry, *, page: str = "", edition: Edition | None = None) ->
 
 
 def _own_paper(entry: Entry) -> str:
-    """Return the address of the team's paper. The benchmark's is not: others wrote it, and it has its own entry."""
+    """Return the address of the team's paper. The benchmark's is not: others wrote it."""
     paper = settings.BENCHMARK.paper
     return "" if paper and entry.paper_url == paper.url else entry.paper_url
 
