@@ -100,10 +100,8 @@ def scale_ratio_of_boxes(reference: ArrayLike, target: ArrayLike, *, measure: Me
 
     The result has the shape (…,). Boxes without size give NaN or infinity.
 
-    >>> reference, target = [0, 0, 8, 8], [0, 0, 10, 10]
-    >>> ratios = (scale_ratio_of_boxes(reference, target, measure=m) for m in MEASURES)
-    >>> [round(float(ratio), 2) for ratio in ratios]
-    [0.64, 0.8, 0.8, 0.8]
+    >>> float(scale_ratio_of_boxes([0, 0, 8, 8], [0, 0, 10, 10], measure="height"))
+    0.8
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = size_of(reference) / size_of(target)

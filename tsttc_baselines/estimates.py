@@ -27,7 +27,10 @@ class Estimate:
 
 
 class Estimator(Protocol):
-    """A baseline with its parameters: a callable that takes a clip and returns an estimate.
+    """A baseline with its parameters, called as `estimator(clip, frame_gap=5)`; returns an `Estimate`.
+
+    `frame_gap` is 1 to 5: the estimate is the scale ratio between frame `5 - frame_gap` and frame 5. For an
+    unusable clip, raise `Unusable`.
 
     If a parameter may be "auto", the object needs an attribute `used`: a dict with the values that it chose.
     The prediction file states them.

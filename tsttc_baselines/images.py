@@ -22,7 +22,7 @@ _MAX_SIZES: Final = 4096
 
 
 class ImageCache:
-    """Keeps the last decoded images in memory, up to `max_bytes`. Make one for each process."""
+    """Keeps the last decoded images in memory, up to `max_bytes` (64 MiB); make one for each process."""
 
     def __init__(self, *, max_bytes: int = MAX_CACHED_BYTES) -> None:
         self._max_bytes = max_bytes

@@ -45,7 +45,7 @@ class BoxCrops(Dataset):  # type: ignore[misc]  # of an extra, which mypy skips
     - `source`: a folder with ground truth, or another source of sequences.
     - `rows`: the rows of the ground truth to use; all by default.
     - `size_px`: the width and height of a crop in pixels.
-    - `context`: the side of a crop, as a multiple of the square root of its box's area.
+    - `context`: the side of a crop, as a multiple of the square root of its box's area; 1.2 by default.
     - `augment`: if true, items are changed at random each time: colours and boxes; some pairs are also
       mirrored, swapped or resized, and their scale ratio is changed to fit.
 
