@@ -43,8 +43,9 @@ METHOD_ID: Final = "Id of the method; null for a result quoted from a paper."
 PAPER_URL: Final = "URL of the paper."
 CODE_URL: Final = "URL of the code."
 DETAILS: Final = "What the method uses and costs, as stated by its team."
-# For sources such as `edition.protocol`: null where there is no edition.
-NULLABLE: Final[dict[str, Any]] = {"default": None, "allow_null": True}
+# For sources such as `edition.protocol`: null without an edition. Read-only, because the schema calls other
+# fields with a default optional, and answers always have them.
+NULLABLE: Final[dict[str, Any]] = {"default": None, "allow_null": True, "read_only": True}
 
 
 class NamedSerializer(serializers.Serializer[Any]):
@@ -171,6 +172,7 @@ class AccountSerializer(serializers.Serializer[Any]):
         source="token.scopes",
         child=serializers.CharField(),
         default=list,
+        read_only=True,
         help_text="What the token may do: `read`, `submit`.",
     )
     split = serializers.CharField(
@@ -192,6 +194,7 @@ class RevokedSerializer(serializers.Serializer[Any]):
 
     detail = serializers.CharField(
         default="If that was a token of this leaderboard, it is revoked now.",
+        read_only=True,
         help_text="The same sentence for every text.",
     )
 
