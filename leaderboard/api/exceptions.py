@@ -75,15 +75,6 @@ def _outage(exc: Exception) -> Response | None:
     return problem(status=outage.status, code=outage.code, detail=outage.sentence, headers=outage.headers)
 
 
-# Of a `Refused` by its code; else 422.
-REFUSED_STATUS: dict[str, int] = {
-    "account-closed": 401,
-    "token-split": 403,
-    "not-admitted": 403,
-    "edition-unknown": 404,
-    **dict.fromkeys(("split-not-open", "split-closed", "edition-refused", "withdrawn", "not-scored"), 409),
-    "too-large": 413,
-}
 # What the domain raises besides `Refused`: status, code, and the input at fault.
 DOMAIN_ERRORS: dict[type[Exception], tuple[int, str, str]] = {
     listing.UnknownColumn: (400, "unknown-column", "sort"),
@@ -98,7 +89,7 @@ DOMAIN_ERRORS: dict[type[Exception], tuple[int, str, str]] = {
 def _domain_error(exc: Exception) -> Response | None:
     match exc:
         case Refused():
-            status = REFUSED_STATUS.get(exc.code, 422)
+            status, *_ = problem_codes.STATUSES.get(exc.code, (422,))
             return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
         case usage.QuotaExceeded() | comparison_queue.TooManyComparisons():
             return _not_yet(exc)

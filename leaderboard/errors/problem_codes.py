@@ -102,6 +102,30 @@ API_GROUPS: Final[dict[str, dict[str, str]]] = {
 }
 """By the titles of the reference: codes and what they mean."""
 API_CODES: Final = {code: about for group in API_GROUPS.values() for code, about in group.items()}
+_CODES_BY_STATUS: Final[dict[int, str]] = {
+    400: "bad-request parse-error invalid bad-limit bad-cursor bad-edition bad-moment bad-visibility "
+    "bad-filter unknown-column bad-comparison",
+    401: "not-authenticated authentication-failed token-malformed token-unknown token-expired token-revoked "
+    "account-closed",
+    403: "token-scope token-split not-admitted permission-denied not-maintainer",
+    404: "not-found not-on-the-board edition-unknown",
+    405: "method-not-allowed",
+    406: "not-acceptable",
+    409: "split-not-open split-closed not-scored withdrawn edition-refused",
+    413: "too-large",
+    415: "unsupported-media-type",
+    429: "throttled quota-exceeded",
+    500: "server-error",
+    503: "database-unavailable store-unavailable",
+    507: "storage-full",
+}
+_BY_CODE: Final = {code: status for status, codes in _CODES_BY_STATUS.items() for code in codes.split()}
+STATUSES: Final[dict[str, tuple[int, ...]]] = {
+    **{code: (_BY_CODE.get(code, 422),) for code in API_CODES},
+    # Of a submission it is a field, of a comparison the thing that was asked for.
+    "unknown-method": (422, 404),
+}
+"""The HTTP statuses of each code of the API; the first is that of a refusal."""
 
 
 def document(*, status: int, code: str, detail: str, where: str = "") -> dict[str, Any]:

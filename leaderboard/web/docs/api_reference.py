@@ -9,7 +9,7 @@ from django.utils.html import format_html, format_html_join
 from drf_spectacular.generators import SchemaGenerator
 
 from evaluator.problems import PROBLEM_CODES
-from leaderboard.errors.problem_codes import API_CODES, API_GROUPS
+from leaderboard.errors.problem_codes import API_CODES, API_GROUPS, STATUSES
 
 Node = dict[str, Any]
 # What drf-spectacular appends for each choice: its name, and its label.
@@ -75,8 +75,15 @@ def reference() -> Node:
         "groups": [(title, [by_id[name] for name in names]) for title, names in _GROUPS.items()],
         "objects": [_object(name, node) for name, node in schemas.items() if "properties" in node],
         "codes": [
-            *((title, codes.items()) for title, codes in API_GROUPS.items()),
-            ("Problems of a file", [each for each in PROBLEM_CODES.items() if each[0] not in API_CODES]),
+            *(
+                (title, [(code, STATUSES[code], about) for code, about in codes.items()])
+                for title, codes in API_GROUPS.items()
+            ),
+            # In the report of a submission, which is no error of a request.
+            (
+                "Problems of a file",
+                [(c, (), about) for c, about in PROBLEM_CODES.items() if c not in API_CODES],
+            ),
         ],
     }
 

@@ -10,7 +10,7 @@ from pytest_django import Settings
 from rest_framework.test import APIClient
 
 from evaluator.problems import PROBLEM_CODES, WARNING_CODES
-from leaderboard.errors.problem_codes import API_CODES
+from leaderboard.errors.problem_codes import API_CODES, STATUSES
 from leaderboard.models import Edition, Split, User
 from leaderboard.storage import files
 from leaderboard.submissions import intake
@@ -31,7 +31,7 @@ def checked(response: Any, status: int, code: str) -> dict[str, Any]:
     assert body["type"].endswith(f"/docs/api/#problem-{code}")
     assert body["detail"].endswith(".")
     assert [set(problem) for problem in body["problems"]] == [{"code", "message", "where"}]
-    assert code in API_CODES
+    assert status in STATUSES[code]
     return body
 
 
@@ -180,6 +180,13 @@ def test_every_code_in_the_source_is_documented_and_every_documented_code_is_the
     guide = (REPOSITORY / "docs" / "problem-codes.md").read_text(encoding="utf-8")
     documented = set(re.findall(r"^\| `([a-z0-9-]+)` \|", guide, flags=re.MULTILINE))
     receipts = {code for code in in_source if code.startswith("receipt-")}
+    statuses = {
+        code: tuple(map(int, numbers.split(", ")))
+        for code, numbers in re.findall(r"^\| `([a-z-]+)` \| ([0-9, ]+) \|", guide, flags=re.MULTILINE)
+    }
+    assert {code: set(each) for code, each in statuses.items()} == {
+        c: set(each) for c, each in STATUSES.items()
+    }
     missing = {*API_CODES, *PROBLEM_CODES, *receipts} - documented
     assert missing == set(), "docs/problem-codes.md lists every code"
     assert documented - {*API_CODES, *PROBLEM_CODES, *receipts} == set()
