@@ -14,7 +14,7 @@ from leaderboard.errors.problem_codes import API_CODES, API_GROUPS, STATUSES
 Node = dict[str, Any]
 # What drf-spectacular appends for each choice: its name, and its label.
 _CHOICE: Final = re.compile(r"\s*^\* `([^`]+)` - (.+)$", re.MULTILINE)
-_GROUPS: Final = {
+GROUPS: Final = {
     "Submissions": {
         "submit": "Submit a file",
         "submission": "Get a submission",
@@ -55,7 +55,7 @@ _GROUPS: Final = {
     },
 }
 """By the titles of the page: operations and what they do."""
-_TITLES: Final = {name: title for group in _GROUPS.values() for name, title in group.items()}
+_TITLES: Final = {name: title for group in GROUPS.values() for name, title in group.items()}
 
 
 @cache
@@ -72,7 +72,7 @@ def reference() -> Node:
     by_id = {operation["id"]: operation for operation in operations}
     return {
         "operations": operations,
-        "groups": [(title, [by_id[name] for name in names]) for title, names in _GROUPS.items()],
+        "groups": [(title, [by_id[name] for name in names]) for title, names in GROUPS.items()],
         "objects": [_object(name, node) for name, node in schemas.items() if "properties" in node],
         "codes": [
             *(

@@ -11,6 +11,7 @@ from django.shortcuts import render
 from django.urls import reverse
 from django.urls.converters import StringConverter
 from django.utils import timezone
+from django.utils.text import slugify
 from django.views.decorators.gzip import gzip_page
 from django.views.decorators.http import require_safe
 
@@ -23,7 +24,7 @@ from leaderboard.web.docs.guides import GuideLink
 from leaderboard.web.markdown import TextHeading
 
 _CHAPTERS_OF_API: Final = [
-    TextHeading(2, "Operations", "operations"),
+    *(TextHeading(3, title, f"group-{slugify(title)}") for title in api_reference.GROUPS),
     TextHeading(2, "Problem codes", "problems"),
     TextHeading(2, "Objects", "shapes"),
 ]
