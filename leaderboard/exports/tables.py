@@ -17,7 +17,7 @@ from evaluator.tables.layouts import Export
 from evaluator.units import RECORDING
 from leaderboard.boards.filters import BadFilter
 from leaderboard.boards.listing import Board
-from leaderboard.boards.rows import ConfidenceInterval, Entry
+from leaderboard.boards.rows import ANONYMOUS_TEAM, ConfidenceInterval, Entry
 from leaderboard.exports import bibtex, eval_results
 from leaderboard.methods.details import DETAILS
 
@@ -127,9 +127,14 @@ def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
     return row
 
 
+def as_printed(entry: Entry) -> Entry:
+    """Return the row for a paper, which under double-blind review must name no anonymous method's team."""
+    return replace(entry, method=entry.pseudonym, team=ANONYMOUS_TEAM) if entry.pseudonym else entry
+
+
 def latex_row(entry: Entry) -> str:
-    """Make one row of the LaTeX table: all scores, without intervals."""
-    return layouts.latex_row(_layout_row(entry, columns=tuple(entry.scores), has_intervals=False))
+    """Make one row of the LaTeX table, as printed: all scores, without intervals."""
+    return layouts.latex_row(_layout_row(as_printed(entry), columns=tuple(entry.scores), has_intervals=False))
 
 
 def _layout_row(entry: Entry, *, columns: Sequence[str], has_intervals: bool) -> layouts.Row:

@@ -116,13 +116,14 @@ def _asked(query: BoardQuery, **more: str) -> str:
 
 
 def of_method(results: Sequence[Result]) -> dict[str, str]:
-    """Return a method's citation, its result for the Hub, and the split of its badge: the first ranked."""
+    """Return a method's BibTeX and LaTeX, its result for the Hub, and its split: of the first ranked."""
     first = next((result for result in results if result.entry.rank is not None), None)
     if first is None:
         return {}
     page = settings.SITE_URL + reverse("method", args=[first.entry.method_id])
     return {
-        "bibtex": bibtex.of_entry(first.entry, page=page, edition=first.edition),
+        "bibtex": bibtex.of_entry(tables.as_printed(first.entry), page=page, edition=first.edition),
+        "latex_row": tables.latex_row(first.entry),
         "eval_result": "\n".join(eval_results.of_entry(first.entry, edition=first.edition)),
         "badge_split": first.split.pk,
     }

@@ -28,7 +28,7 @@ from leaderboard.web.boards.score_columns import (
 )
 from leaderboard.web.boards.tables import rank_range
 from leaderboard.web.formatting import grouped
-from leaderboard.web.methods.score_cards import Gap, gap_of, gap_to_best, score_card
+from leaderboard.web.methods.score_cards import Gap, citation, gap_of, gap_to_best, score_card
 
 _MAX_REASON: Final = 110
 
@@ -81,13 +81,17 @@ def method_result(result: Result, pairs: Sequence[Pair]) -> dict[str, Any]:
     """Return the result of a method on a split for its page; `pairs` are with `result.rivals`."""
     entry, gaps = result.entry, [gap_of(pair) for pair in pairs]
     gap = next((each for each in gaps if result.best and each.other.id == result.best.id), None)
+    card = score_card(entry, result.rows, n_ranked=result.n_ranked, gap=gap)
     values = [attempt.value for attempt in reversed(result.attempts) if attempt.value is not None]
     # Of an anonymous method only days are known, and no order within a day.
     is_ordered = len({attempt.at for attempt in result.attempts}) == len(result.attempts)
     return {
         "result": result,
         "table": edition_table(entry, result.edition),
-        "card": score_card(entry, result.rows, n_ranked=result.n_ranked, gap=gap),
+        "card": card,
+        "citation": citation(card, split=result.split.title, edition=result.edition.number)
+        if card and entry.rank and entry.is_visible_to_all
+        else "",
         "nearby": _nearby(entry, gaps),
         "is_tested": any(not each.why_not_tested for each in gaps),
         "why_not_tested": dict.fromkeys(each.why_not_tested for each in gaps if each.why_not_tested),

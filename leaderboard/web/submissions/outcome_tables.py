@@ -11,7 +11,7 @@ from django.utils.text import get_text_list
 from evaluator.counting import counted
 from evaluator.metrics.protocol import grouped_names, split_name
 from evaluator.scoring.results import format_rounded
-from leaderboard.boards.rows import ANONYMOUS_TEAM, Entry
+from leaderboard.boards.rows import Entry
 from leaderboard.exports import tables
 from leaderboard.models import Submission, Visibility
 from leaderboard.quotas.usage import Quota
@@ -55,9 +55,6 @@ def outcome_table(
     card = score_card(entry, rows, n_ranked=n_ranked, gap=gap_to_best(entry, rows))
     # A private method has no rank that others could look up.
     quoted = replace(entry, rank=None) if board_position and board_position.is_supposed else entry
-    if entry.pseudonym:
-        # A paper under double-blind review must not name the team.
-        quoted = replace(quoted, method=entry.pseudonym, team=ANONYMOUS_TEAM)
     return {
         "table": result_table(entry, progress.counts),
         "card": card,
@@ -103,7 +100,8 @@ def _comparison_rows(
             _comparison_row(entry, own)
             | {
                 "href": reverse("submission", args=[own.submission_id]),
-                "about": f"{'your' if is_mine else 'its'} team’s best other submission, {own.date_text}",
+                "about": f"{'your' if is_mine else 'its'} team’s best other submission,",
+                "date": own.date_text,
                 "compare_href": f"{reverse('compare')}?{urlencode(query)}"
                 if is_compared and own.method_id != submission.method_id
                 else "",
@@ -111,8 +109,11 @@ def _comparison_rows(
         )
     printed = outcomes.nearest_published(progress, board_position)
     if printed is not None:
-        about = f"nearest row from a paper, {tables.team_of(printed)} {printed.date_text}"
-        rows.append(_comparison_row(entry, printed) | {"href": printed.paper_url, "about": about})
+        about = f"nearest row from a paper, {tables.team_of(printed)}"
+        rows.append(
+            _comparison_row(entry, printed)
+            | {"href": printed.paper_url, "about": about, "date": printed.date_text}
+        )
     return rows
 
 

@@ -227,6 +227,25 @@ def test_a_team_is_not_cited_as_author_of_the_benchmarks_paper(
     assert "eprint" not in citation
 
 
+def test_a_methods_page_has_its_row_of_the_latex_table(edition: Edition, owner: User, client: Client) -> None:
+    method, *_ = board_rows.fill(edition, n=1, user=owner)
+    row = pages.get(client, f"/methods/{method.pk}/").one("code", id="latex-row").raw_text
+    assert row in text_of(client, "tex").splitlines()
+
+
+def test_a_team_finds_nothing_to_paste_that_names_its_anonymous_method(
+    edition: Edition, owner: User, signed_in: Client
+) -> None:
+    sent = builders.submit(owner, builders.predictions(edition), method="Secret Net", visibility="ANONYMOUS")
+    builders.score_all()
+    page = pages.get(signed_in, f"/methods/{sent.method.pk}/")
+    for pasted in ("bibtex", "latex-row"):
+        text = page.one("code", id=pasted).raw_text
+        assert sent.method.pseudonym in text
+        assert "secret" not in text.lower()
+        assert sent.method.team.name not in text
+
+
 @pytest.fixture
 def pdflatex() -> str:
     """The TeX that Debian calls texlive-latex-base; CI has it."""

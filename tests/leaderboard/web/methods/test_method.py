@@ -123,6 +123,20 @@ def test_head_says_the_score_its_lead_and_the_way_there(client: Client, method: 
     assert len(strip.one("svg", class_="strip").all("line", class_="own")) == 1
 
 
+def test_it_gives_a_sentence_to_quote_and_says_how_to_verify_the_number(
+    client: Client, method: Method
+) -> None:
+    main = get(client, method).one("main")
+    quoted = main.one("code", id="citation-test").text
+    assert re.fullmatch(r"MiD [0-9.]+ ×10⁻⁴, rank 1, Test, edition 1", quoted)
+    hrefs = [link.attributes.get("href") for link in main.all("a")]
+    assert {"/board/test/editions/1/", "/docs/cli/#verify"} <= {*hrefs}
+    Method.objects.update(visibility=Visibility.PRIVATE)
+    builders.board_changed("test")
+    client.force_login(method.team.members.get())
+    assert get(client, method).all("code", id="citation-test") == [], "nobody could look it up"
+
+
 def test_nearby_ranks_are_those_that_they_would_be_beside_a_private_method(
     client: Client, method: Method, owner: User
 ) -> None:
