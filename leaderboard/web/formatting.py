@@ -11,6 +11,8 @@ from evaluator import format_rounded
 from evaluator.counting import counted
 from leaderboard.boards.rows import ConfidenceInterval
 
+_BETWEEN_ENDS = re.compile(r"(?<=\d) to (?=[+−]?\d)")
+
 
 def grouped(value: int | None) -> str:
     """Group thousands, as 28,600."""
@@ -115,6 +117,15 @@ def with_bold_names(sentence: str, names: Collection[str]) -> SafeString:
     parts = re.split(rf"(?<!\w)({choices})(?!\w)", sentence)
     parts[::2] = [re.sub(r"\bp ([=≤<≥]) (?=\d)", "p\u00a0\\1\u00a0", part) for part in parts[::2]]
     return _alternating(parts, "<b>{}</b>")
+
+
+def unbroken(text: str) -> str:
+    """Keep each interval of a text on one line.
+
+    >>> unbroken("lower (2.9 to 5.3)").split(" ")
+    ['lower', '(2.9\\xa0to\\xa05.3)']
+    """
+    return _BETWEEN_ENDS.sub("\N{NO-BREAK SPACE}to\N{NO-BREAK SPACE}", text)
 
 
 def breakable(path: str) -> SafeString:

@@ -23,6 +23,21 @@ LIBRARY: Final = "echarts"
 # Bytes as they came over the line, headers included.
 TRANSFERRED: Final = """() => ["navigation", "resource"].flatMap(kind => performance.getEntriesByType(kind))
   .map(entry => [entry.name, entry.transferSize])"""
+# Intervals in tables and verdicts that go on in the next line, those of closed tables, too.
+BROKEN_INTERVALS: Final = r"""() => {
+  const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), broken = [];
+  for (let text; text = texts.nextNode();) {
+    if (!text.parentElement.closest("td:not(.guide td), .verdict, .sentence, .score-card")) continue;
+    for (const {0: interval, index} of text.data.matchAll(/[+−]?[0-9.]+\sto\s[+−]?[0-9.]+/g)) {
+      const range = document.createRange();
+      range.setStart(text, index);
+      range.setEnd(text, index + interval.length);
+      const tops = [...range.getClientRects()].map(line => line.top);
+      if (Math.max(...tops) - Math.min(...tops) > 4) broken.push(interval);
+    }
+  }
+  return broken;
+}"""
 # Half of 1440 and of 1280 px: what is left of them at 200 %.
 ZOOMED_PX: Final = (720, 640)
 # Chromium's own size of letters is 16.
@@ -63,6 +78,7 @@ def _faults(page: Page, address: str) -> Iterator[str]:
     yield from _pale(page, where="360 px, dark")
     _show(page, NARROW, scheme="light")
     yield from _pale(page, where="360 px, light")
+    yield from (f"the interval {each} breaks at 360 px" for each in page.evaluate(BROKEN_INTERVALS))
 
 
 def _show(page: Page, viewport: dict[str, int], *, scheme: Any) -> None:
