@@ -139,7 +139,7 @@ def test_comparison_is_the_previews_line_by_line(keeper: Client, rescored: Editi
     rows = root.one("table", class_="changes").one("tbody").all("tr")
     assert [row.one("th").one("a").text for row in rows] == [change.method for change in expected.changes]
     for row, change in zip(rows, expected.changes, strict=True):
-        assert f"{change.team}, sent {change.submitted_at:%Y-%m-%d}" in row.one("th").text
+        assert f"{change.team}, submitted {change.submitted_at:%Y-%m-%d}" in row.one("th").text
         cells = row.all("td")
         for cell, name in zip(cells[1:], SCORE_NAMES, strict=True):
             old, new, delta = change.old[name], change.new[name], change.delta[name]
