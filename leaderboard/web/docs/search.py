@@ -87,9 +87,9 @@ def _pattern(word: str, *, is_exact: bool = False) -> re.Pattern[str]:
 
 
 def _snippet(part: Part, asked: list[re.Pattern[str]]) -> SafeString:
-    """Return prose, a row of a table, or other text with the words; else the beginning of the prose."""
+    """Return prose, a row of a table or a line of code with the words; else the beginning of the prose."""
     marked = re.compile("(" + "|".join(word.pattern for word in asked) + ")", re.IGNORECASE)
-    pieces = (part.prose, *part.rows, part.text)
+    pieces = (part.prose, *part.text.splitlines())
     text = " ".join(next(filter(marked.search, pieces), part.prose or part.text).split())
     first = marked.search(text)
     begin = text.rfind(" ", 0, max(0, first.start() - 60)) + 1 if first else 0

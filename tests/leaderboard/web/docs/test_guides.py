@@ -119,6 +119,11 @@ def test_every_form_of_a_word_finds_the_part_that_explains_it(
     assert "/docs/scoring/#protocols" in [href for href, _ in search_hits(client, query)[:3]]
 
 
+def test_a_line_of_code_with_the_words_stands_alone() -> None:
+    (hit,) = [each for each in search.find("truncation") if each.address == "/docs/annotation/#the-output"]
+    assert hit.snippet == "1,573 observations are <mark>truncated</mark>"
+
+
 def test_the_words_asked_for_are_marked_and_are_never_markup(client: Client, benchmark: None) -> None:
     assert "<mark>quota</mark>" in client.get("/docs/search/?q=quota").text
     for query in ("<script>alert(1)</script>", '"><img src=x>', "\x00", "%", "(" * 50):
