@@ -93,6 +93,8 @@ def search_hits(client: Client, query: str) -> list[tuple[str, str]]:
         ("quota-exceeded", "/docs/problem-codes/#rates-and-quotas"),
         ("bootstr", "/docs/uncertainty/"),
         ("how to submit", "/docs/cli/#submit"),
+        ("--fail-if", "/docs/cli/#submit"),
+        ("looks-like-ratios", "/docs/file-format/#warnings"),
         ("how to get an API token", "/docs/access/#tokens"),
         ("what is an edition", "/docs/editions/"),
     ],
@@ -156,6 +158,7 @@ def test_the_first_page_names_a_split_that_is_open_or_says_that_none_is(
 
 def test_where_no_part_has_all_words_those_with_some_are_shown() -> None:
     assert search.find("quota xyzzyq")
+    assert search.find("quota-xyzzyq") == search.find("quota xyzzyq")
     assert search.find("xyzzyq") == []
 
 
