@@ -42,12 +42,11 @@ class TextHeading:
 
 @dataclass(frozen=True)
 class Part:
-    """The plain text below one heading, code last, for the search; `prose` has no tables and code."""
+    """The plain text below one heading, for the search: the prose is a line, then each row, then code."""
 
     heading: TextHeading
     text: str
     prose: str = ""
-    rows: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -158,8 +157,8 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
     prose, rows, code = list[str](), list[str](), list[str]()
 
     def part() -> Part:
-        whole = " ".join(filter(None, [*prose, *rows, *code]))
-        return Part(heading, whole, " ".join(prose), tuple(row.strip(" ·") for row in rows))
+        sentences = " ".join(prose)
+        return Part(heading, "\n".join(filter(None, [sentences, *rows, *code])), sentences)
 
     _label_cells(tokens)
     for at, token in enumerate(tokens):

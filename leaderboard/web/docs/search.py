@@ -17,6 +17,8 @@ _SNIPPET: Final = 200
 # Pages of names, where a word is often a name: what explains it comes first.
 _REFERENCES: Final = frozenset({"cli", *python_reference.SECTIONS})
 _WORD: Final = re.compile(r"[^\W_]+")
+# A name such as "fail-if" or "bag_stamp" is asked for as a whole.
+_ASKED: Final = re.compile(r"[^\W_]+(?:[-_][^\W_]+)*")
 # A longer word also finds what begins with it: "quot" finds "quota", but "to" does not find "token".
 _MAX_SHORT: Final = 3
 # Its ending does not count: "truncation" finds "truncated".
@@ -41,7 +43,7 @@ class Hit(NamedTuple):
 
 def find(query: str) -> list[Hit]:
     """Return at most `MAX_HITS` parts, those of one guide together; parts with some words if none has all."""
-    typed = set(_WORD.findall(query.lower()))
+    typed = set(_ASKED.findall(query.lower()))
     words = sorted(typed - _FILLERS or typed)
     asked = [_pattern(word) for word in words]
     exact = [_pattern(word, is_exact=True) for word in words]
@@ -64,6 +66,9 @@ def find(query: str) -> list[Hit]:
                 address = reverse("guide", args=[name]) + anchor
                 snippet = _snippet(part, asked)
                 ranked.append((rank, Hit(guide.title, heading.text if anchor else "", address, snippet)))
+    apart = " ".join(_WORD.findall(query))
+    if not ranked and apart != query:
+        return find(apart)
     has_all = [each for each in ranked if each[0][0] == 0]
     hits = [hit for _, hit in sorted(has_all or ranked, key=lambda each: each[0])[:MAX_HITS]]
     titles = [hit.title for hit in hits]
@@ -83,14 +88,16 @@ def _pattern(word: str, *, is_exact: bool = False) -> re.Pattern[str]:
         end = r"(?:e?s)?(?![^\W_])"
     else:
         end = rf"{_ENDINGS}?(?![^\W_])" if is_exact else r"[^\W_]*"
-    return re.compile(rf"(?<![^\W_]){re.escape(beginning)}{end}", re.IGNORECASE)
+    beginning = r"[-_\s]".join(map(re.escape, re.split("[-_]", beginning)))
+    return re.compile(rf"(?<![^\W_]){beginning}{end}", re.IGNORECASE)
 
 
 def _snippet(part: Part, asked: list[re.Pattern[str]]) -> SafeString:
-    """Return prose, a row of a table, or other text with the words; else the beginning of the prose."""
+    """Return the prose, the row of a table or the line of code with most of the words."""
     marked = re.compile("(" + "|".join(word.pattern for word in asked) + ")", re.IGNORECASE)
-    pieces = (part.prose, *part.rows, part.text)
-    text = " ".join(next(filter(marked.search, pieces), part.prose or part.text).split())
+    pieces = (part.prose, *part.text.splitlines())
+    best = max(pieces, key=lambda piece: sum(bool(word.search(piece)) for word in asked))
+    text = " ".join((best or part.text).split())
     first = marked.search(text)
     begin = text.rfind(" ", 0, max(0, first.start() - 60)) + 1 if first else 0
     end = len(text) if len(text) <= begin + _SNIPPET else text.rfind(" ", 0, begin + _SNIPPET)

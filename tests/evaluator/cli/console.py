@@ -20,7 +20,7 @@ from typing import Any
 from evaluator import receipts
 from evaluator.metrics.protocol import PROTOCOLS, SCORE_NAMES
 from evaluator.papers.tables import published_tables
-from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
+from tests.evaluator.cli.recorded_site import RecordedSite, Reply
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY
 
 DOCUMENTS = (REPOSITORY / "docs" / "cli.md", EXAMPLES / "README.md")
@@ -179,8 +179,6 @@ def put_documented_answers(site: RecordedSite) -> None:
     site.put("GET /api/v1/splits/test/board", Reply(published_board("test", on_test)))
     on_val = dict(zip(OPEN.score_names, ON_VAL, strict=True))
     site.put("GET /api/v1/splits/val/board", Reply(published_board("val", on_val)))
-    unknown = problem("There is nothing at this address that you may see.", code="not-found")
-    site.put("GET /api/v1/splits/trial/board", Reply(unknown, status=404))
 
 
 def put_more_documented_answers(site: RecordedSite) -> None:

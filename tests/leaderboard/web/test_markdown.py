@@ -64,7 +64,7 @@ def test_a_part_has_the_text_below_its_heading() -> None:
     drawn = markdown.page("Before\n\n## A `b`\n\nOne *two*\nthree.\n\n```sh\nls -l\n```\n")
     assert [(part.heading.text, part.text) for part in drawn.parts] == [
         ("", "Before"),
-        ("A b", "One two three. ls -l\n"),
+        ("A b", "One two three.\nls -l\n"),
     ]
 
 

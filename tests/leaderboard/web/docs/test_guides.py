@@ -93,6 +93,8 @@ def search_hits(client: Client, query: str) -> list[tuple[str, str]]:
         ("quota-exceeded", "/docs/problem-codes/#rates-and-quotas"),
         ("bootstr", "/docs/uncertainty/"),
         ("how to submit", "/docs/cli/#submit"),
+        ("--fail-if", "/docs/cli/#submit"),
+        ("looks-like-ratios", "/docs/file-format/#warnings"),
         ("how to get an API token", "/docs/access/#tokens"),
         ("what is an edition", "/docs/editions/"),
     ],
@@ -117,6 +119,11 @@ def test_every_form_of_a_word_finds_the_part_that_explains_it(
     client: Client, benchmark: None, query: str
 ) -> None:
     assert "/docs/scoring/#protocols" in [href for href, _ in search_hits(client, query)[:3]]
+
+
+def test_a_line_of_code_with_the_words_stands_alone() -> None:
+    (hit,) = [each for each in search.find("truncation") if each.address == "/docs/annotation/#the-output"]
+    assert hit.snippet == "1,573 observations are <mark>truncated</mark>"
 
 
 def test_the_words_asked_for_are_marked_and_are_never_markup(client: Client, benchmark: None) -> None:
@@ -151,6 +158,7 @@ def test_the_first_page_names_a_split_that_is_open_or_says_that_none_is(
 
 def test_where_no_part_has_all_words_those_with_some_are_shown() -> None:
     assert search.find("quota xyzzyq")
+    assert search.find("quota-xyzzyq") == search.find("quota xyzzyq")
     assert search.find("xyzzyq") == []
 
 
