@@ -46,7 +46,7 @@ class Parameter:
 
     @property
     def default_in_words(self) -> str | None:
-        """The default as text, for a file only its name. None if there is no default."""
+        """The default as text, for a file only its name; None if there is no default."""
         if self.default is None:
             return None
         return self.default.name if isinstance(self.default, Path) else str(self.default)
