@@ -165,8 +165,8 @@ class SequenceFolder:
 def read_folder(path: str | os.PathLike[str]) -> SequenceFolder:
     """Read a folder that `tsttc baseline run` takes: tables and images, or the downloaded dataset.
 
-    `path` is the folder. Raises `Rejected` for another folder, or if a table or an annotation file has an
-    error. Images are checked when they are used.
+    `path` is the folder. Raises `Rejected` if it has another form, or if a table or an annotation file
+    has an error. Images are checked when they are used.
     """
     path = Path(path)
     root = path / IMAGES if (path / IMAGES).is_dir() else path
