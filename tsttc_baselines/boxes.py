@@ -118,7 +118,7 @@ def is_usable(box: ArrayLike, *, min_side_px: float = 0.0) -> bool:
 
     >>> is_usable([10, 20, 30, 50])
     True
-    >>> is_usable([30, 20, 10, 50]) or is_usable([10, 20, np.nan, 50])
+    >>> is_usable([30, 20, 10, 50])
     False
     """
     return bool(np.all(np.isfinite(np.asarray(box, dtype=np.float64))) and np.all(size_of(box) > min_side_px))

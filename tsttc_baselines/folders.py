@@ -48,7 +48,7 @@ class SequenceFolder:
     - `manifest`: the list of the sequences.
     - `boxes`: an array of shape (n, 6, 4), for each sequence the boxes of its six frames as x1, y1, x2, y2. A
       missing box is NaN.
-    - `boxes_from`: the name of the file or folder that the boxes were read from.
+    - `boxes_from`: what the boxes were read from: "boxes.csv" or "annotation files".
     - `is_normalised`: true if boxes are parts of the image's width and height, false if they are pixels.
     - `has_own_numbers`: true if the folder has no manifest. A board may then have other anno_ids.
     """
@@ -73,7 +73,7 @@ class SequenceFolder:
         return content.hexdigest()
 
     def rows_in_time(self) -> NDArray[np.intp]:
-        """Return the numbers of all rows, ordered by recording, camera and time."""
+        """Return all rows, ordered by recording, camera and time."""
         # Sequences that share frames follow each other.
         manifest = self.manifest
         return np.lexsort((manifest.ts_ns, np.array(manifest.cam_id), np.array(manifest.bag_stamp)))
@@ -165,8 +165,8 @@ class SequenceFolder:
 def read_folder(path: str | os.PathLike[str]) -> SequenceFolder:
     """Read a folder that `tsttc baseline run` takes: tables and images, or the downloaded dataset.
 
-    `path` is the folder. Raises `Rejected` if it is neither, or if a table or an annotation file has an
-    error. Boxes and images are checked later.
+    `path` is the folder. Raises `Rejected` if it has another form, or if a table or an annotation file
+    has an error. Images are checked when they are used.
     """
     path = Path(path)
     root = path / IMAGES if (path / IMAGES).is_dir() else path
@@ -200,7 +200,7 @@ def read_folder(path: str | os.PathLike[str]) -> SequenceFolder:
 def read_folder_truth(path: Path) -> GroundTruth:
     """Read the ground truth of the folder `path`: its `truth.csv`, or its annotation files.
 
-    Raises `Rejected` if it has neither.
+    Raises `Rejected` if the folder has none of them.
     """
     if (path / TRUTH).is_file():
         return read_truth(path / TRUTH)

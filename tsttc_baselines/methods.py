@@ -46,7 +46,7 @@ class Parameter:
 
     @property
     def default_in_words(self) -> str | None:
-        """The default as text, for a file only its name. None if there is no default."""
+        """The default as text, for a file only its name; None if there is no default."""
         if self.default is None:
             return None
         return self.default.name if isinstance(self.default, Path) else str(self.default)
@@ -169,8 +169,8 @@ METHODS: Final[tuple[Method, ...]] = (
                 choices=("full", "coarse-to-fine"),
             ),
         ),
-        # The published row is the work of the toolkit's code, for what the paper words.
-        published={"bins": 125, "shift": 3, "top": 3, "expand": 1.1},
+        # The paper's words and the toolkit's code differ; the published row is taken to be the code's.
+        published={"variant": "toolkit", "bins": 125, "shift": 3, "top": 3, "expand": 1.1},
     ),
     Method(
         name="tracking",

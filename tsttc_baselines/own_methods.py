@@ -31,7 +31,7 @@ class MethodMissing(Exception):
 
 
 def find_method(name: str) -> Method:
-    """Return a method by its name: of this package, of an installed one, or MODULE:NAME.
+    """Return a method by its name: of this package, of an installed package, or "module:name".
 
     Raises `MethodMissing` if there is none.
     """

@@ -53,8 +53,8 @@ class Run:
     - `scale_ratio`: an array of one value for each sequence, in the order of the manifest.
     - `n_fallback`: the number of fallbacks by reason, the most frequent first.
     - `examples`: one problem for each reason.
-    - `n_resumed`: the number of values that an interrupted run had left.
-    - `seconds`: the time of the run, with that of the interrupted one.
+    - `n_resumed`: the number of values that come from an interrupted run.
+    - `seconds`: the duration of the run; that of an interrupted run is added.
     - `meta`: the field `meta` of the prediction file.
     - `data`: the bytes of the prediction file.
     """

@@ -38,11 +38,11 @@ CONTEXT: Final = 1.2
 
 
 class BoxCrops(Dataset):  # type: ignore[misc]  # of an extra, which mypy skips
-    """A dataset of torch: pairs of crops, with their true scale ratio, to train a network.
+    """A `Dataset` of torch: pairs of crops, with their true scale ratio, to train a network.
 
     The arguments:
 
-    - `source`: a folder with ground truth, or another source of sequences.
+    - `source`: the path of a folder with ground truth, or a `tsttc_baselines.pairs.Source`.
     - `rows`: the rows of the ground truth to use; all by default.
     - `size_px`: the width and height of a crop in pixels.
     - `context`: the side of a crop, as a multiple of the square root of its box's area; 1.2 by default.
@@ -56,8 +56,8 @@ class BoxCrops(Dataset):  # type: ignore[misc]  # of an extra, which mypy skips
     - `box_ratio`: the side of the reference's square divided by that of the target's.
     - `scale_ratio`: the true α, at a gap of five frames.
     - `row`: the row of the ground truth.
-    - `usable`: false if the sequence has no usable pair. Its crops are black then, and `box_ratio` is that
-      of its boxes, or 1.
+    - `usable`: false if a box or an image of the sequence cannot be used. Then the crops are black, and
+      `box_ratio` is computed from the boxes, or 1 without usable boxes.
     """
 
     def __init__(
@@ -122,7 +122,7 @@ def crops_of_clip(
     """Return the crops of a clip, as a tensor like those of `BoxCrops`, and their `box_ratio`.
 
     `frame_gap` is the number of frames between reference and target, 1 to 5; `size_px` and `context` are as
-    in `BoxCrops`. Raises `Unusable` where a box is missing, too small, or has its centre outside of the
+    in `BoxCrops`. Raises `Unusable` if a box is missing, too small, or has its centre outside of the
     image.
     """
     boxes = boxes_of_pair(clip, frame_gap=frame_gap)

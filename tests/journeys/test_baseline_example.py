@@ -19,10 +19,11 @@ PAGE = (EXAMPLES.parent / "docs" / "baselines.md").read_text(encoding="utf-8")
 
 
 def commands_of(heading: str) -> list[list[str]]:
-    """The `tsttc` commands of the first shell block below a heading of the page."""
-    block = re.search(r"```sh\n(.*?)```", PAGE.partition(f"\n## {heading}\n")[2], re.DOTALL)
-    assert block is not None, heading
-    return [shlex.split(line)[1:] for line in block[1].splitlines() if line.startswith("tsttc ")]
+    """The `tsttc` commands of the shell blocks below a heading of the page, up to those with the dataset."""
+    chapter = PAGE.partition(f"\n## {heading}\n")[2].partition("**With the dataset**")[0]
+    blocks = re.findall(r"```sh\n(.*?)```", chapter, re.DOTALL)
+    lines = [line for block in blocks for line in block.splitlines()]
+    return [shlex.split(line)[1:] for line in lines if line.startswith("tsttc ")]
 
 
 def test_the_example_goes_from_frames_to_a_row_in_four_commands(
