@@ -34,7 +34,7 @@ _KEEP_SMALL: Final = (
     "values. In that case, keep the quota small."
 )
 
-_CHALLENGE: Final = "A challenge on the same labels. You can list it at once."
+_CHALLENGE: Final = "A challenge on the same ground truth. You can list it at once."
 
 
 def _choice(name: str, about: str) -> SafeString:
@@ -197,8 +197,8 @@ class NewSplitForm(PolicyForm):
         super().__init__(data, initial=initial)
         able = Split.objects.filter(same_truth_as=None).exclude(current_edition=None)
         self.fields["truth"].choices = [  # type: ignore[attr-defined]  # a ChoiceField
-            ("hidden", _choice("New, hidden", "Teams cannot read the labels.")),
-            ("open", _choice("New, open", "The labels are public.")),
+            ("hidden", _choice("New, hidden", "Teams cannot read the ground truth.")),
+            ("open", _choice("New, open", "The ground truth is public.")),
             *((f"as {row.pk}", _choice(f"Same as {row.title}", _CHALLENGE)) for row in able),
         ]
 
