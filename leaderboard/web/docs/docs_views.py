@@ -79,7 +79,8 @@ def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
 def find(request: HttpRequest) -> HttpResponse:
     query = " ".join(request.GET.get("q", "").replace("\x00", " ").split())[: search.MAX_QUERY]
     hits = search.find(query) if query else []
-    context = {"navigation": _navigation(request.path), "query": query, "hits": hits}
+    navigation = _navigation(request.path)
+    context = {"navigation": navigation, "query": query, "hits": hits, "most": search.MAX_HITS}
     return render(request, "docs/search.html", context)
 
 

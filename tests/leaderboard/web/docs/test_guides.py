@@ -126,6 +126,13 @@ def test_a_line_of_code_with_the_words_stands_alone() -> None:
     assert hit.snippet == "1,573 observations are <mark>truncated</mark>"
 
 
+def test_a_list_of_results_that_was_cut_says_so(client: Client, benchmark: None) -> None:
+    assert "The 12 best results" in client.get("/docs/search/?q=quota").text
+    n_hits = len(search.find("systemd"))
+    assert 1 < n_hits < search.MAX_HITS
+    assert f"{n_hits} results" in client.get("/docs/search/?q=systemd").text
+
+
 def test_the_words_asked_for_are_marked_and_are_never_markup(client: Client, benchmark: None) -> None:
     assert "<mark>quota</mark>" in client.get("/docs/search/?q=quota").text
     for query in ("<script>alert(1)</script>", '"><img src=x>', "\x00", "%", "(" * 50):
