@@ -162,8 +162,13 @@ def put_documented_answers(site: RecordedSite) -> None:
         "truncated": {"-20": 171, "-0.15": 0, "0.05": 0, "20": 302},
     }
     faults = [
-        ("missing-keys", "2 sequences have no value: 17, 41; expected one for each of 28,600.", "/17"),
-        ("zero", "The value is 0; expected a time to contact other than 0.", "/8"),
+        (
+            "missing-keys",
+            "2 sequences have no value: 17, 41; expected one for each of the manifest's 28,600 sequences, "
+            "by anno_id.",
+            "/17",
+        ),
+        ("zero", "The value is 0; expected a time to contact other than 0, negative when moving away.", "/8"),
     ]
     rejected = submission | {
         "id": REJECTED_ID,
