@@ -65,7 +65,7 @@ class Method:
     - `title`, `summary`: the name and one sentence for people.
     - `factory`: "module:name" of a callable that takes the parameters as keywords and returns an `Estimator`.
     - `parameters`: the parameters with their defaults.
-    - `published`: the values of the parameters in a published row; None if no row is published.
+    - `published`: the paper's values of the parameters; None if the paper does not have the method.
     - `frames`: the images that it needs: "none", "pair" for the reference and the target frame, or "all" six.
     - `boxes`: the boxes that it needs: "pair", or only that of the "target".
     """
@@ -97,7 +97,7 @@ class Method:
         return known | dict(given)
 
     def provenance(self, parameters: Mapping[str, Value], *, digests: Mapping[str, str] | None = None) -> str:
-        """Return whether these parameters are "as published", a "variant" of the row, or "unpublished".
+        """Return "as published" for the paper's parameters, "variant" for others, "unpublished" without any.
 
         `digests` are the SHA-256 of files among the parameters, by which a published file is known.
         """

@@ -84,7 +84,7 @@ def run_method(
     - `folder`: the sequences, from `read_folder`.
     - `method`: the method, from `get_method` or `find_method`.
     - `parameters`: its parameters by name; defaults are filled in.
-    - `frame_gap`: frames between the reference and the target frame, 1 to 5.
+    - `frame_gap`: the number of frames from the reference to the target, 1 to 5.
     - `out`: the file to write. While the run lasts, its state is in a file beside it that ends in `.part`;
       after an interruption, the same call continues.
     - `n_processes`: the number of processes.

@@ -121,8 +121,8 @@ def crops_of_clip(
 ) -> tuple[Any, float]:
     """Return the crops of a clip, as a tensor like those of `BoxCrops`, and their `box_ratio`.
 
-    `frame_gap` is the number of frames between reference and target, 1 to 5; `size_px` and `context` are as
-    in `BoxCrops`. Raises `Unusable` if a box is missing, too small, or has its centre outside of the
+    `frame_gap` is the number of frames from the reference to the target, 1 to 5; `size_px` and `context` are
+    as in `BoxCrops`. Raises `Unusable` if a box is missing, too small, or has its centre outside of the
     image.
     """
     boxes = boxes_of_pair(clip, frame_gap=frame_gap)
