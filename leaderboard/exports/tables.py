@@ -132,9 +132,10 @@ def as_printed(entry: Entry) -> Entry:
     return replace(entry, method=entry.pseudonym, team=ANONYMOUS_TEAM) if entry.pseudonym else entry
 
 
-def latex_row(entry: Entry) -> str:
-    """Make one row of the LaTeX table, as printed: all scores, without intervals."""
-    return layouts.latex_row(_layout_row(as_printed(entry), columns=tuple(entry.scores), has_intervals=False))
+def latex_row(entry: Entry, *, has_intervals: bool = False) -> str:
+    """Make one row of the LaTeX table, as printed: all scores, with or without intervals."""
+    row = _layout_row(as_printed(entry), columns=tuple(entry.scores), has_intervals=has_intervals)
+    return layouts.latex_row(row)
 
 
 def _layout_row(entry: Entry, *, columns: Sequence[str], has_intervals: bool) -> layouts.Row:

@@ -208,13 +208,26 @@ def teams_best_other(submission: Submission, position: BoardPosition) -> Entry |
         evaluation__submission__method__team=submission.method.team_id
     )
     best_pk = others.exclude(evaluation__submission=submission).values_list("evaluation", flat=True).first()
-    if best_pk is None:
-        return None
-    evaluation = (
-        Evaluation.objects.select_related("submission__method__team", "edition")
-        .prefetch_related("scores")
-        .get(pk=best_pk)
+    return _entry_of(Evaluation.objects.filter(pk=best_pk), position) if best_pk else None
+
+
+def previous_of_method(submission: Submission, position: BoardPosition) -> Entry | None:
+    """Return the scored submission of the same method before this one, on the same board."""
+    earlier = Evaluation.objects.filter(
+        edition=position.edition,
+        status=Status.SCORED,
+        submission__method=submission.method_id,
+        submission__withdrawn_at=None,
+        submission__submitted_at__lt=submission.submitted_at,
     )
+    return _entry_of(earlier.order_by("-submission__submitted_at"), position)
+
+
+def _entry_of(evaluations: QuerySet[Evaluation], position: BoardPosition) -> Entry | None:
+    rows = evaluations.select_related("submission__method__team", "edition").prefetch_related("scores")
+    evaluation = rows.first()
+    if evaluation is None:
+        return None
     entry = submitted_entry(
         evaluation,
         scored_of(evaluation),
@@ -222,8 +235,8 @@ def teams_best_other(submission: Submission, position: BoardPosition) -> Entry |
         decimals=position.edition.decimals,
     )
     # What has ranges is a row of the board.
-    rows = (row for row in position.rows if row.submission_id == entry.submission_id)
-    return replace(entry, intervals=next((row.intervals for row in rows), entry.intervals))
+    shown = (row for row in position.rows if row.submission_id == entry.submission_id)
+    return replace(entry, intervals=next((row.intervals for row in shown), entry.intervals))
 
 
 def nearest_published(progress: Progress, position: BoardPosition) -> Entry | None:

@@ -124,6 +124,9 @@ def of_method(results: Sequence[Result]) -> dict[str, str]:
     return {
         "bibtex": bibtex.of_entry(tables.as_printed(first.entry), page=page, edition=first.edition),
         "latex_row": tables.latex_row(first.entry),
+        "latex_with_intervals": tables.latex_row(first.entry, has_intervals=True)
+        if first.entry.intervals
+        else "",
         "eval_result": "\n".join(eval_results.of_entry(first.entry, edition=first.edition)),
         "badge_split": first.split.pk,
     }

@@ -12,7 +12,7 @@ from django.shortcuts import render
 from django.views.decorators.gzip import gzip_page
 from django.views.decorators.http import require_safe
 
-from evaluator.metrics.protocol import OVERALL, SCORE_NAMES, metric_of, split_name
+from evaluator.metrics.protocol import OVERALL, SCORE_NAMES, TTC_RANGES, metric_of, split_name
 from evaluator.metrics.registry import Metric
 from evaluator.papers.tables import PublishedRow, PublishedTable, published_tables
 from evaluator.tables import published
@@ -180,6 +180,7 @@ def published_page(request: HttpRequest) -> HttpResponse:
             for each, chart in chain.from_iterable(groups.values())
         ],
         "groups": groups,
+        "ranges": ", ".join(f"{each.name} {each.seconds}" for each in TTC_RANGES),
         "source": published_tables().source,
         "downloads": DOWNLOADS,
     }

@@ -96,6 +96,11 @@ def method_result(result: Result, pairs: Sequence[Pair]) -> dict[str, Any]:
         "is_tested": any(not each.why_not_tested for each in gaps),
         "why_not_tested": dict.fromkeys(each.why_not_tested for each in gaps if each.why_not_tested),
         "history": whiskers.sparkline(values) if len(values) > 1 and is_ordered else "",
+        "first_and_last": [
+            format_rounded(value, decimals=entry.decimals) for value in values[:: len(values) - 1]
+        ]
+        if len(values) > 1
+        else [],
         "rank_range": rank_range(entry),
         "errors": result.edition.rules.metrics,
         "attempts": [

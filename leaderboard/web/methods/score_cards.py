@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from django.conf import settings
 from django.utils.safestring import SafeString
 
 from evaluator.metrics.protocol import metric_of
 from evaluator.metrics.registry import Metric
 from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import Entry
+from leaderboard.exports import tables
 from leaderboard.statistics.comparisons import Pair
 from leaderboard.web.boards import whiskers
 from leaderboard.web.boards.score_columns import NOTHING, interval_words
@@ -112,8 +114,11 @@ def gap_to_best(entry: Entry, rows: Sequence[Entry]) -> Gap | None:
 
 
 def citation(card: ScoreCard, *, split: str, edition: int | None) -> str:
-    """Word a score as one quotes it: value, interval, rank, and where it is from."""
-    interval = f" [{card.interval.replace(' to ', ', ')}]" if card.interval else ""
-    rank = f", rank {card.entry.rank} {card.rank_range}".rstrip() if card.entry.rank else ""
-    value = f"{card.metric.symbol} {card.value}{interval} {card.metric.unit}".rstrip()
-    return f"{value}{rank}, {split}, edition {edition}"
+    """Word a score as one quotes it: method, value, interval, rank, and where and when it was submitted."""
+    entry = tables.as_printed(card.entry)
+    interval = f" (95% CI [{card.interval.replace(' to ', ', ')}])" if card.interval else ""
+    rank = f", rank {entry.rank}{f' {card.rank_range}' if card.rank_range else ''} of {card.n_ranked}"
+    value = f"{card.metric.symbol} {card.value} {card.metric.unit}".rstrip()
+    board = f"{settings.BENCHMARK.name} {split}, edition {edition}"
+    date = f", submitted {entry.date:%Y-%m-%d}" if entry.date else ""
+    return f"{entry.method}: {value}{interval}{rank if entry.rank else ''}, {board}{date}"

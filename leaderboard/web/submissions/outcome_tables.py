@@ -44,6 +44,7 @@ def outcome_table(
         intervals=outcomes.published_intervals(progress, board_position),
         method_id=submission.method_id,
         submission_id=submission.pk,
+        date=submission.submitted_at,
         visibility=submission.method.visibility,
         pseudonym=submission.method.pseudonym if submission.method.visibility == Visibility.ANONYMOUS else "",
         rank=board_position.rank if board_position else None,
@@ -71,6 +72,7 @@ def outcome_table(
         if board_position
         else [],
         "latex": tables.latex_row(quoted),
+        "latex_with_intervals": tables.latex_row(quoted, has_intervals=True) if entry.intervals else "",
         "latex_order": _order_words(progress.scores),
     }
 
@@ -91,8 +93,18 @@ def _comparison_rows(
     submission: Submission, progress: Progress, board_position: BoardPosition, entry: Entry, *, is_mine: bool
 ) -> list[dict[str, Any]]:
     rows = []
+    previous = outcomes.previous_of_method(submission, board_position)
+    if previous is not None:
+        rows.append(
+            _comparison_row(entry, previous)
+            | {
+                "href": reverse("submission", args=[previous.submission_id]),
+                "about": "its previous submission,",
+                "date": previous.date_text,
+            }
+        )
     own = outcomes.teams_best_other(submission, board_position)
-    if own is not None:
+    if own is not None and (previous is None or own.submission_id != previous.submission_id):
         # Where values are hidden, two methods of one team are never compared.
         is_compared = is_mine and board_position.rank is not None and not submission.split.is_hidden
         query = [("split", submission.split_id), ("m", submission.method_id), ("m", own.method_id)]

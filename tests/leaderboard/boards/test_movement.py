@@ -14,7 +14,7 @@ from tests.caching import forget_boards
 
 pytestmark = pytest.mark.slow
 
-NEW = "On the board for less than 14 days"
+NEW = "Submitted or published less than 14 days ago"
 
 
 @pytest.fixture

@@ -128,7 +128,8 @@ def test_it_gives_a_sentence_to_quote_and_says_how_to_verify_the_number(
 ) -> None:
     main = get(client, method).one("main")
     quoted = main.one("code", id="citation-test").text
-    assert re.fullmatch(r"MiD [0-9.]+ ×10⁻⁴, rank 1, Test, edition 1", quoted)
+    words = r"Foo: MiD [0-9.]+ ×10⁻⁴, rank 1 of 6, TSTTC Test, edition 1, submitted 20\d\d-\d\d-\d\d"
+    assert re.fullmatch(words, quoted)
     hrefs = [link.attributes.get("href") for link in main.all("a")]
     assert {"/board/test/editions/1/", "/docs/cli/#verify"} <= {*hrefs}
     Method.objects.update(visibility=Visibility.PRIVATE)

@@ -129,6 +129,23 @@ def test_it_stands_beside_the_teams_best_other_and_the_nearest_published_row(
     assert PAGE.format(inferred[0].pk) in [a.attributes["href"] for a in root.all("a")]
 
 
+def test_it_stands_beside_the_previous_submission_of_its_method(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
+    factors = (1.05, 1.2, 1.1)
+    first, second, third = (
+        builders.submit(owner, builders.predictions(edition, factor=factor)) for factor in factors
+    )
+    builders.score_all()
+    previous, best, _ = beside(look(signed_in, third))
+    assert previous[0].startswith("Foo, its previous submission, 20")
+    assert previous[1:3] == [f"{mid(second):.1f}", f"−{round(mid(second) - mid(third), 1):.1f}"]
+    assert best[1] == f"{mid(first):.1f}"
+    beside_second = [row[0] for row in beside(look(signed_in, second))]
+    assert ["previous" in words for words in beside_second] == [True, False]
+    assert not any("best other" in words for words in beside_second), "that is the previous one"
+
+
 def test_another_method_of_the_team_is_not_compared_with_where_values_are_hidden(
     signed_in: Client, inferred: list[Submission]
 ) -> None:
@@ -187,9 +204,9 @@ def test_score_is_quoted_in_one_line_and_no_interval_breaks(
 ) -> None:
     root = look(signed_in, inferred[1])
     quoted = root.one("code", id="citation").text
-    assert re.fullmatch(
-        r"MiD ([0-9.]+) \[[0-9.]+, [0-9.]+\] ×10⁻⁴, rank \d( \(\d–\d\))?, Test, edition 1", quoted
-    )
+    score = r"M1\.1: MiD [0-9.]+ ×10⁻⁴ \(95% CI \[[0-9.]+, [0-9.]+\]\)"
+    board = r"TSTTC Test, edition 1, submitted 20\d\d-\d\d-\d\d"
+    assert re.fullmatch(rf"{score}, rank \d( \(\d–\d\))? of \d+, {board}", quoted)
     cells = root.one("div", class_="result").all("td", class_="span")
     assert all(
         re.fullmatch(r"[0-9.]+–[0-9.]+", cell.all("span")[0].text) for cell in cells if cell.text != "–"
@@ -230,7 +247,7 @@ def test_number_of_queries_does_not_grow_with_the_board_or_the_team(
     address = PAGE.format(inferred[1].pk)
     look(signed_in, inferred[1])
     before = n_queries(signed_in, address)
-    assert before <= 11
+    assert before <= 12
     board_rows.fill(edition, n=30, user=stranger)
     board_rows.score(edition, methods=list(Method.objects.filter(team=inferred[0].method.team)), user=owner)
     builders.board_changed("test")
