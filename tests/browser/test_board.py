@@ -17,6 +17,17 @@ N_COMPARED = 5
 SPILLED = """() => [...document.querySelectorAll("table.board :is(td, th):not(.interval, .choose)")]
   .filter(cell => cell.checkVisibility() && cell.scrollWidth > cell.clientWidth + 3)
   .map(cell => `${cell.className}: ${cell.textContent.trim().slice(0, 40)}`)"""
+# The smallest room between two numbers of a row, each as wide as one of three digits.
+APART_PX = """() => Math.min(...[...document.querySelectorAll("table.board tbody tr")].flatMap(row => {
+  const scores = [...row.cells].filter(cell => /^[0-9]+[.][0-9]/.test(cell.textContent.trim()));
+  const boxes = scores.filter(cell => !cell.matches(".interval")).map(cell => {
+    const range = document.createRange();
+    cell.textContent = "613.18";
+    range.selectNodeContents(cell);
+    return range.getBoundingClientRect();
+  });
+  return boxes.slice(1).map((box, i) => box.left - boxes[i].right);
+}))"""
 LOW_LINKS = """() => [...document.querySelectorAll("table.board thead a, .view-tools :is(a, summary), .chip")]
   .filter(each => each.checkVisibility() && each.getBoundingClientRect().height < 24)
   .map(each => each.textContent)"""
@@ -67,7 +78,8 @@ def test_an_open_menu_stays_in_the_window(new_page: NewPage, board: None) -> Non
             page.locator(".menu > summary", has_text=name).click()
             body = page.locator(".menu[open] > .menu-body").bounding_box()
             assert body is not None
-            if body["x"] < 0 or body["x"] + body["width"] > width or page.evaluate(OVERFLOW_PX):
+            right, bottom = body["x"] + body["width"], body["y"] + body["height"]
+            if body["x"] < 0 or right > width or bottom > 800 or page.evaluate(OVERFLOW_PX):
                 faults.append(f"{width}: {name} {body}")
             page.keyboard.press("Escape")
     assert faults == []
@@ -185,4 +197,5 @@ def test_on_paper_no_number_lies_over_its_neighbour(page: Page, board: None) -> 
     page.goto(BOARD)
     page.emulate_media(media="print")
     assert page.evaluate(SPILLED) == []
+    assert page.evaluate(APART_PX) > 3
     expect(page.get_by_role("heading", name="Progress over time")).to_be_hidden()
