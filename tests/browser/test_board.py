@@ -1,6 +1,7 @@
 """The board on every screen: it fits, its heads stay, it answers at once, and it keeps what is ticked."""
 
 import re
+from typing import Literal
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -36,6 +37,8 @@ HEAD_TOP_PX = """() => {
   return document.querySelector("table.board thead").getBoundingClientRect().top;
 }"""
 FIRST_ROW_PX = 'document.querySelector("table.board tbody tr").getBoundingClientRect().top'
+# As the errors by TTC range, which have their table there: they are below a board of fewer than three dates.
+NEEDS_NO_SCRIPT = """document.querySelector(".board-progress").classList.remove("drawn-only")"""
 ADD_TWO_SPLITS = """() => {
   const tabs = document.querySelector(".splits");
   for (const title of ["Winter challenge 2027", "Fog and rain"])
@@ -190,6 +193,17 @@ def test_without_scripts_no_heading_stands_over_a_chart_that_is_not_there(
     page = new_page(java_script_enabled=False)
     page.goto(BOARD)
     expect(page.get_by_role("heading", name="Progress over time")).to_be_hidden()
+
+
+@pytest.mark.parametrize(("has_scripts", "media"), [(False, "screen"), (True, "print")])
+def test_a_chart_that_has_its_table_below_the_board_stays_without_scripts_and_on_paper(
+    new_page: NewPage, board: None, has_scripts: bool, media: Literal["screen", "print"]
+) -> None:
+    page = new_page(java_script_enabled=has_scripts)
+    page.emulate_media(media=media)
+    page.goto(BOARD)
+    page.evaluate(NEEDS_NO_SCRIPT)
+    expect(page.get_by_role("heading", name="Progress over time")).to_be_visible()
 
 
 def test_on_paper_no_number_lies_over_its_neighbour(page: Page, board: None) -> None:
