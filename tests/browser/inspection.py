@@ -28,7 +28,7 @@ BROKEN_INTERVALS: Final = r"""() => {
   const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), broken = [];
   for (let text; text = texts.nextNode();) {
     if (!text.parentElement.closest("td:not(.guide td), .verdict, .sentence, .score-card")) continue;
-    for (const {0: interval, index} of text.data.matchAll(/[+−]?[0-9.]+\sto\s[+−]?[0-9.]+/g)) {
+    for (const {0: interval, index} of text.data.matchAll(/[+−]?[0-9.]+(?:\sto\s|–)[+−]?[0-9.]+/g)) {
       const range = document.createRange();
       range.setStart(text, index);
       range.setEnd(text, index + interval.length);
@@ -38,6 +38,12 @@ BROKEN_INTERVALS: Final = r"""() => {
   }
   return broken;
 }"""
+# Sentences in a narrow column of many lines although the screen is wide.
+SQUEEZED: Final = """() => [...document.querySelectorAll("main :is(p, dd, li, td)")].filter(each => {
+  const {width, height} = each.getBoundingClientRect();
+  const nLines = height / parseFloat(getComputedStyle(each).lineHeight);
+  return width && width < 144 && nLines > 5 && each.textContent.trim().length > 40;
+}).map(each => each.textContent.trim().slice(0, 40))"""
 # Half of 1440 and of 1280 px: what is left of them at 200 %.
 ZOOMED_PX: Final = (720, 640)
 # Chromium's own size of letters is 16.
@@ -65,6 +71,7 @@ def _faults(page: Page, address: str) -> Iterator[str]:
     page.evaluate(AXE)
     yield from _cost(page, document_bytes)
     yield from (f"moves while it loads: {each}" for each in moved)
+    yield from (f"is squeezed at 1440 px: {each}" for each in page.evaluate(SQUEEZED))
     # Every text in both colours at both widths; axe, which takes ten times as long, once.
     yield from axe(page, where="1440 px, light")
     _show(page, WIDE, scheme="dark")

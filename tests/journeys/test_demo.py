@@ -92,6 +92,8 @@ def test_the_demo_shows_scored_submissions_survives_a_dead_worker_and_ends_clean
 
         login = re.search(r"Sign in as (\S+) with the password (\S+)", output)
         assert login, output
+        assert "Maintain as maintainer@example.org with the same password" in output
+        assert f"mails in {tmp_path / 'mail'}" in output
         site = Site(url=url, directory=tmp_path, environment={})
         visitor = Visitor(site)
         answer = visitor.post_form("/accounts/login/", {"login": login[1], "password": login[2]})
@@ -99,6 +101,9 @@ def test_the_demo_shows_scored_submissions_survives_a_dead_worker_and_ends_clean
         maintainer = Visitor(site)
         maintainer.post_form("/accounts/login/", {"login": "maintainer@example.org", "password": login[2]})
         assert "Queue" in maintainer.text_of("/maintain/")
+        maintainer.post_form("/accounts/password/reset/", {"email": login[1]})
+        (mail,) = site.mails
+        assert "/accounts/password/reset/key/" in mail
         maintainer.close()
         assert "simulated" in visitor.text_of("/board/demo/").lower()
         assert f"pip install {url}/dist/tsttc-" in visitor.text_of("/dist/")

@@ -150,7 +150,7 @@ def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
             corrections.publish(
                 edition=row, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
             )
-            messages.success(request, f"Edition {number} is now the board of {split}.")
+            messages.success(request, f"Edition {number} is now the {row.split.title} board.")
             return redirect("board", split)
     return form_page(
         request, "maintain/publish.html", form, unfinished=corrections.unfinished(row), **context
@@ -168,7 +168,8 @@ def roll_back(request: HttpRequest, split: str, number: int) -> HttpResponse:
                 split_name=split, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
             )
             messages.success(
-                request, f"Edition {number} was rolled back; the board of {split} is the one before it."
+                request,
+                f"Edition {number} was rolled back: the {row.split.title} board is the one before it.",
             )
             return redirect("board", split)
     context = {**_comparison(former), "undone": edition_tables.change_words(former, row)} if former else {}

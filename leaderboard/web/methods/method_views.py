@@ -116,6 +116,8 @@ def change_visibility(request: HttpRequest, method_id: UUID) -> HttpResponse:
             preview = visibility_preview.preview(method=own, visibility=wanted["visibility"], now=now)
             if request.method == "POST" and not form.cleaned_data["confirm"]:
                 form.add_error("confirm", "Confirm that this cannot be undone: tick the box.")
+            elif own.visibility == "ANONYMOUS" and request.POST.get("previous") == "PRIVATE":
+                form.add_error("confirm", "The method has become anonymous meanwhile: read this page again.")
             elif request.method == "POST":
                 visibility.change(method=own, actor=cast("User", request.user), now=now, **wanted)
                 messages.success(request, _published_sentence(own.pk))

@@ -244,6 +244,28 @@ def test_page_shows_what_others_will_see_asks_and_shows_it(
     assert left.all("form") == []
 
 
+def test_preview_of_a_method_that_has_become_anonymous_meanwhile_is_confirmed_again(
+    client: Client, sent: Submission, method: Method, owner: User
+) -> None:
+    client.force_login(owner)
+    address = f"/methods/{method.pk}/visibility/"
+    early = confirmed(pages.page(client.get(address, {"visibility": "PUBLIC"})))
+    change(method, "ANONYMOUS", owner)
+    response = client.post(address, early)
+    assert response.status_code == 422
+    words = pages.page(response).one("div", id="id_confirm_error").text
+    assert words == "The method has become anonymous meanwhile: read this page again."
+    assert Method.objects.get().visibility == Visibility.ANONYMOUS
+    assert client.post(address, confirmed(pages.page(response))).status_code == 302
+    assert Method.objects.get().visibility == Visibility.PUBLIC
+
+
+def confirmed(page: pages.Element) -> dict[str, str]:
+    """The fields of the preview's form with its box ticked."""
+    hidden = [each.attributes for each in page.all("form")[-1].all("input", type="hidden")]
+    return {each["name"]: each["value"] for each in hidden} | {"confirm": "on"}
+
+
 # --- the API -----------------------------------------------------------------------------------------------
 
 

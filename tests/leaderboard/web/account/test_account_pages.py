@@ -28,6 +28,13 @@ def test_sign_up_signs_in_and_goes_on_to_submitting(client: Client, edition: Edi
     assert message.startswith("Your account is ready, and you are signed in. Next: send a prediction file")
 
 
+def test_sign_up_on_the_way_to_another_page_suggests_nothing_else(client: Client, edition: Edition) -> None:
+    response = sign_up(client, next="/docs/")
+    assert response.headers["Location"] == "/docs/"
+    message = pages.get(client, "/docs/").one("p", class_="message").text
+    assert message == "Your account is ready, and you are signed in."
+
+
 def test_sign_up_tells_of_all_that_is_wrong_at_once_and_of_each_rule_once(client: Client, db: None) -> None:
     form = {"email": "new@example.org", "name": "", "password1": "12345", "password2": "54321"}
     root = pages.page(client.post("/accounts/signup/", form))

@@ -235,6 +235,13 @@ def test_withdrawn_entry_leaves_its_mark_in_a_former_edition(
     )
 
 
+def test_list_promises_of_a_withdrawn_submission_what_the_editions_show(
+    client: Client, replaced: Edition
+) -> None:
+    lead = get(client, EDITIONS).one("p", class_="lead").text
+    assert "After a submission is withdrawn, no edition shows its scores." in lead
+
+
 def test_every_page_that_stays_has_its_own_canonical_address(client: Client, replaced: Edition) -> None:
     def canonical(address: str) -> list[str]:
         links = get(client, address).all("link", rel="canonical")

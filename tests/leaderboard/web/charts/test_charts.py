@@ -125,6 +125,15 @@ def test_a_progress_has_three_dates_and_else_errors_by_range_are_drawn(
     assert ("progress", True) in below("/board/test/charts/")
 
 
+def test_caption_of_the_progress_says_that_it_has_all_rows_whatever_the_filter(
+    client: Client, entries: list[Submission]
+) -> None:
+    spread(entries)
+    section = get(client, "/board/test/?q=M1.05").one("section", class_="board-progress")
+    words = "All public submissions to Test, and rows quoted from papers."
+    assert section.one("p", class_="note").text.startswith(words)
+
+
 def test_below_a_board_the_chart_does_not_change_with_its_filters(
     client: Client, entries: list[Submission]
 ) -> None:

@@ -67,6 +67,16 @@ def test_a_visitor_finds_the_empty_template_in_the_docs_and_a_way_on_from_a_miss
     assert {"/board/test/", "/board/val/"} <= {a.attributes["href"] for a in missing.all("a")}
 
 
+def test_no_code_of_the_documentation_has_a_hat_which_only_equations_set_over_its_letter(
+    client: Client, benchmark: None
+) -> None:
+    drawn = {name: pages.read(guides.guide(name).html) for name in guides.files()}
+    drawn["docs"] = pages.get(client, "/docs/").one("main")
+    hat = "\N{COMBINING CIRCUMFLEX ACCENT}"
+    assert [name for name, root in drawn.items() for code in root.all("code") if hat in code.text] == []
+    assert drawn["scoring"].all("math") != []
+
+
 def test_a_guide_links_public_pages_that_it_names_and_shows_the_address_of_the_site(
     client: Client, benchmark: None
 ) -> None:

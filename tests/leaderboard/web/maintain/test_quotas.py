@@ -145,6 +145,12 @@ def test_hub_leads_to_a_list_of_all_teams(keeper: Client, team: Team, stranger: 
     assert sorted(row[0] for row in listed) == sorted(["Owls", other.name])
 
 
+def test_pages_of_a_team_lead_back_to_the_list_of_teams(keeper: Client, team: Team) -> None:
+    for where in (f"{TEAMS}{team.pk}/", address(team), address(team, "test")):
+        trail = get(keeper, where).one("p", class_="trail").all("a")
+        assert [a.attributes["href"] for a in trail][:2] == ["/maintain/", TEAMS], where
+
+
 @pytest.mark.parametrize("text", ["x" * 255, "\0"])
 def test_what_cannot_be_looked_up_has_a_reason_at_its_field(keeper: Client, team: Team, text: str) -> None:
     answer = keeper.get(TEAMS, {"team": text})

@@ -97,7 +97,7 @@ def test_publishing_makes_it_the_board_with_the_reason(
     )
     assert response.redirect_chain == [("/board/test/", 302)]
     root = assert_sound(response)
-    assert "Edition 2 is now the board of test." in root.one("div", class_="messages").text
+    assert "Edition 2 is now the Test board." in root.one("div", class_="messages").text
     assert "edition 2 (5 labels corrected)" in root.one("p", class_="facts").text
     publication = Publication.objects.first()
     assert publication is not None
@@ -144,6 +144,8 @@ def test_rolling_back_returns_the_board_as_it_was(
     assert root.one("input", name="replaces").attributes["value"] == "2"
     response = keeper.post(f"{SECOND}roll-back/", {"reason": "A mistake.", "replaces": 2}, follow=True)
     assert pages.board_rows(pages.page(response)) == before
+    message = pages.page(response).one("div", class_="messages").text
+    assert message == "Edition 2 was rolled back: the Test board is the one before it."
     assert "Rolled back from edition 2 to edition 1. A mistake." in main_text(keeper, "/board/test/editions/")
 
 
