@@ -118,8 +118,8 @@ def _truth_warnings(predictions: Predictions, truth: GroundTruth) -> list[FileWa
         cause = "Probably the values are inverse times, 1/τ; expected seconds."
     message = (
         f"The predictions hardly match the true times: their rank correlation is {correlation:.2f}, and "
-        f"{100 * flipped:.0f} % have the opposite sign; expected at least {MIN_CORRELATION} and at most "
-        f"{100 * MAX_FLIPPED:.0f} %. {cause}"
+        f"{100 * flipped:.0f}% have the opposite sign; expected at least {MIN_CORRELATION} and at most "
+        f"{100 * MAX_FLIPPED:.0f}%. {cause}"
     )
     return [FileWarning("unlike-truth", message)]
 

@@ -52,7 +52,7 @@ def test_shuffled_values_are_warned_of(driven: GroundTruth) -> None:
 def test_signs_of_the_other_convention_are_reported_as_that(driven: GroundTruth) -> None:
     assert codes(driven, -driven.ttc_s) == ([], ["unlike-truth"])
     [warning] = warnings_with_truth(predicted(driven, -driven.ttc_s), driven)
-    assert "rank correlation is -1.00, and 100 % have the opposite sign" in warning.message
+    assert "rank correlation is -1.00, and 100% have the opposite sign" in warning.message
     assert warning.message.endswith("Probably every sign is wrong: τ is negative when the object moves away.")
 
 
