@@ -1,4 +1,4 @@
-"""Looking before switching, and what former editions and withdrawn entries leave."""
+"""Looking before switching, and what earlier editions and withdrawn entries leave."""
 
 import random
 from pathlib import Path
