@@ -100,6 +100,8 @@ def search_hits(client: Client, query: str) -> list[tuple[str, str]]:
     ("query", "address"),
     [
         ("quota", "/docs/access/#quotas"),
+        ("how many files", "/docs/access/#quotas"),
+        ("how many submissions", "/docs/access/#quotas"),
         ("quota-exceeded", "/docs/problem-codes/#rates-and-quotas"),
         ("bootstr", "/docs/uncertainty/"),
         ("how to submit", "/docs/cli/#submit"),
