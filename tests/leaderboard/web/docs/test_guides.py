@@ -100,7 +100,8 @@ def search_hits(client: Client, query: str) -> list[tuple[str, str]]:
     ("query", "address"),
     [
         ("quota", "/docs/access/#quotas"),
-        ("how many files", "/docs/access/#quotas"),
+        ("how many files", "/docs/faq/#how-many-files-may-i-send"),
+        ("how many files may I send", "/docs/access/#quotas"),
         ("how many submissions", "/docs/access/#quotas"),
         ("quota-exceeded", "/docs/problem-codes/#rates-and-quotas"),
         ("bootstr", "/docs/uncertainty/"),
