@@ -97,7 +97,7 @@ WARNING_CODES: Final[dict[str, str]] = {
     "not-seconds": "Nearly all values lie beyond ±20 s: probably milliseconds.",
     "looks-like-ratios": "Nearly all values lie between 0.5 and 1.5: probably scale ratios without a unit.",
     "flipped-signs": "Values of one object rise while time passes: probably every sign is wrong.",
-    "shuffled-values": "Values of one object differ as much as those of several: probably wrong keys.",
+    "shuffled-values": "The predictions seem to be in another order than the sequences: probably wrong keys.",
     "unlike-truth": "The predictions do not match the true times, or have the opposite sign.",
     "other-numbering": "The toolkit numbers the sequences of a folder differently on this machine.",
 }

@@ -15,7 +15,7 @@ ttc_s = truth.ttc_s * np.random.default_rng(1).normal(1.0, 0.1, truth.n_sequence
 predictions = evaluator.Predictions.from_arrays(ttc_s=ttc_s, manifest=truth.manifest)
 report = evaluator.evaluate(predictions, truth)
 print(f"MiD {report.scores['overall'].mid:.2f}, crucial {report.scores['crucial'].mid:.2f}")
-print(f"RTE {report.scores['overall'].rte:.2f} % of {report.n_sequences} sequences")
+print(f"RTE {report.scores['overall'].rte:.2f}% of {report.n_sequences} sequences")
 
 data = evaluator.write_predictions(manifest=truth.manifest, ttc_s=ttc_s, meta={"model": "mine"})
 print(f"{len(data):,} bytes for tsttc submit; write_predictions('mine.json', …) writes them")

@@ -33,7 +33,7 @@ predictions = evaluator.read_predictions(data, manifest=truth.manifest)
 
 for protocol in ("toolkit", "tsttc-1"):
     report = evaluator.evaluate(predictions, truth, protocol=protocol)
-    print(f"{protocol}: MiD {report.scores['overall'].mid:.2f}, RTE {report.scores['overall'].rte:.2f} %")
+    print(f"{protocol}: MiD {report.scores['overall'].mid:.2f}, RTE {report.scores['overall'].rte:.2f}%")
 
 # The same from a shell: tsttc convert results.json --annotations FOLDER -o mine.json
 #                        tsttc score mine.json --truth FOLDER

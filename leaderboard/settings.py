@@ -309,7 +309,7 @@ ACCOUNT_EMAIL_VERIFICATION_BY_CODE_ENABLED = SENDS_MAIL
 # Proxies of ours in front: of X-Forwarded-For, what the last so many wrote is believed, and nothing else.
 TRUSTED_PROXIES = env.int("TSTTC_TRUSTED_PROXIES", default=0)
 ALLAUTH_TRUSTED_PROXY_COUNT = TRUSTED_PROXIES
-# Whether maintainers need a second factor for their pages (see web/account/accounts.py).
+# Whether maintainers need two-factor authentication for their pages (see web/account/accounts.py).
 REQUIRE_SECOND_FACTOR = env.bool("TSTTC_REQUIRE_SECOND_FACTOR", default=False)
 # Without a mail server nobody could verify an address.
 MFA_ALLOW_UNVERIFIED_EMAIL = not SENDS_MAIL

@@ -155,7 +155,7 @@ function send() {
   request.setRequestHeader("Accept", "application/json, text/html");
   request.upload.addEventListener("progress", ({ loaded, total }) => {
     const percent = Math.round((100 * loaded) / total);
-    progress(loaded < total ? `Sending: ${percent} %` : "Sent. The server saves the file…", loaded < total ? loaded / total : null);
+    progress(loaded < total ? `Sending: ${percent}%` : "Sent. The server saves the file…", loaded < total ? loaded / total : null);
   });
   request.addEventListener("load", () => received(request));
   request.addEventListener("error", () => lost());

@@ -105,7 +105,7 @@ def _sequences(manifest_path: Path | None, annotations: Path | None) -> tuple[Ma
     callback=lambda c, p, value: value and slug(c, p, value),
     help="Get the manifest of this split from the leaderboard.",
 )
-@click.option("--edition", type=int, metavar="N", help="With --split: of a former edition, by its number.")
+@click.option("--edition", type=int, metavar="N", help="With --split: of an earlier edition, by its number.")
 @output_option("the CSV table")
 @site_options
 @json_option

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 from urllib.parse import urljoin
 
 import click
@@ -34,6 +34,8 @@ from evaluator.problems import Rejected, n_problems_in_words
 if TYPE_CHECKING:
     from evaluator.client.answers import BoardEntry, Submission
     from evaluator.client.api import Client
+
+_NOT_COUNTED: Final = "This file was not scored and did not count against your quota."
 
 
 @click.command(short_help="Submit a prediction file to the leaderboard.")
@@ -224,7 +226,7 @@ def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> fro
     try:
         predictions = read_predictions(data, manifest=manifest)
     except Rejected as fault:
-        hint = "Nothing was submitted; your quota is not used."
+        hint = "This file was not submitted and did not count against your quota."
         raise rejected(name_of(path), fault, hint=hint) from None
     warnings = warnings_of(predictions)
     echo_warnings(warnings)
@@ -287,13 +289,13 @@ def conclude(
             n_problems = submission.n_problems or len(submission.problems)
             count_text = n_problems_in_words(n_problems, n_lines=len(submission.problems))
             message, exit_code = f"The file is rejected: {count_text}.", Exit.REJECTED
-            hint = "Your quota is not used. Check a corrected file with: tsttc check"
+            hint = f"{_NOT_COUNTED} Check a corrected file with: tsttc check"
         case "SYSTEM_ERROR":
             message, exit_code = (
                 f"The server failed to score {named}. The fault is not the file's.",
                 Exit.SYSTEM,
             )
-            hint = "Your quota is not used."
+            hint = _NOT_COUNTED
         case "CANCELLED":
             message, exit_code, hint = f"{named} was cancelled, so it has no scores.", Exit.REFUSED, ""
         case _:

@@ -72,12 +72,14 @@ class Metric:
 
     @property
     def unit_of_value(self) -> str:
-        """The unit after a value in a sentence, with its space; empty for a power of ten.
+        """The unit after a value in a sentence, with its space if it has one; empty for a power of ten.
 
         >>> MID.unit_of_value, RTE.unit_of_value
-        ('', ' %')
+        ('', '%')
         """
-        return "" if self.unit.startswith("×") or not self.unit else f" {self.unit}"
+        if self.unit.startswith("×"):
+            return ""
+        return self.unit if self.unit in {"", "%"} else f" {self.unit}"
 
     @property
     def unit_of_difference(self) -> str:
@@ -109,7 +111,7 @@ def _motion_in_depth_error(terms: Terms) -> Floats:
 
 
 def _relative_ttc_error(terms: Terms) -> Floats:
-    """Compute RTE = |(τ̂ − τ) / τ| · 100 %."""
+    """Compute RTE = |(τ̂ − τ) / τ| · 100%."""
     import numpy as np  # noqa: PLC0415 -- as the docstring above says
 
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -126,7 +128,7 @@ def is_warning(ttc_s: Floats, *, threshold_s: float | Floats) -> NDArray[np.bool
 
 
 def _warning_error(terms: Terms) -> Floats:
-    """Compute 100 % where one of τ̂ and τ is in (0 s, 2.7 s] and the other is not, else 0; NaN of NaN."""
+    """Compute 100% where one of τ̂ and τ is in (0 s, 2.7 s] and the other is not, else 0; NaN of NaN."""
     import numpy as np  # noqa: PLC0415 -- as the docstring above says
 
     warned, due = (

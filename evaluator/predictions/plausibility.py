@@ -89,9 +89,9 @@ def _order_warnings(manifest: Manifest, ttc_s: Floats) -> list[FileWarning]:
     if jump_ratio is None or jump_ratio <= MAX_ROUGHNESS:
         return []
     message = (
-        "The values look shuffled: from one window to the next those of one object differ "
-        f"{jump_ratio:.2f} times as much as those of two objects; expected at most {MAX_ROUGHNESS}, since "
-        f"an object changes slowly. {_CAUSE}"
+        "The predictions seem to be in another order than the sequences. Successive predictions for one "
+        "object should be similar, but they differ about as much as those for different objects (ratio "
+        f"{jump_ratio:.2f}; expected at most {MAX_ROUGHNESS}). {_CAUSE}"
     )
     return [FileWarning("shuffled-values", message)]
 
@@ -118,15 +118,15 @@ def _truth_warnings(predictions: Predictions, truth: GroundTruth) -> list[FileWa
         cause = "Probably the values are inverse times, 1/τ; expected seconds."
     message = (
         f"The predictions hardly match the true times: their rank correlation is {correlation:.2f}, and "
-        f"{100 * flipped:.0f} % have the opposite sign; expected at least {MIN_CORRELATION} and at most "
-        f"{100 * MAX_FLIPPED:.0f} %. {cause}"
+        f"{100 * flipped:.0f}% have the opposite sign; expected at least {MIN_CORRELATION} and at most "
+        f"{100 * MAX_FLIPPED:.0f}%. {cause}"
     )
     return [FileWarning("unlike-truth", message)]
 
 
 _CAUSE: Final = (
-    "Probably the anno_ids are those of the toolkit on a machine that lists the annotation files in another "
-    "order: tsttc convert FILE --annotations FOLDER writes natural keys."
+    "Probably the anno_ids are those of the dataset's toolkit, which differ between machines. To write "
+    "natural keys instead, run: tsttc convert FILE --annotations FOLDER -o OUT"
 )
 
 

@@ -145,9 +145,9 @@ def _by_range(details: Details) -> dict[str, Rows]:
 def _by_occlusion(details: Details) -> dict[str, Rows]:
     values = _stated(details.truth.objects.occ_ratio, "occ_ratio")
     return {
-        "0 %": np.flatnonzero(values == 0),
+        "0%": np.flatnonzero(values == 0),
         **{
-            f"{100 * low:g}–{100 * high:g} %": np.flatnonzero((values > low) & (values <= high))
+            f"{100 * low:g}–{100 * high:g}%": np.flatnonzero((values > low) & (values <= high))
             for low, high in ((0.0, 0.25), (0.25, 0.5), (0.5, 1.0))
         },
         NOT_STATED: np.flatnonzero(np.isnan(values)),
@@ -168,10 +168,10 @@ def _by_box_size(details: Details) -> dict[str, Rows]:
     edges = (0.0, 0.05, 0.1, 0.2, 0.4)
     return {
         **{
-            f"{100 * low:g}–{100 * high:g} %": np.flatnonzero((values > low) & (values <= high))
+            f"{100 * low:g}–{100 * high:g}%": np.flatnonzero((values > low) & (values <= high))
             for low, high in itertools.pairwise(edges)
         },
-        f"over {100 * edges[-1]:g} %": np.flatnonzero(values > edges[-1]),
+        f"over {100 * edges[-1]:g}%": np.flatnonzero(values > edges[-1]),
         NOT_STATED: np.flatnonzero(np.isnan(values)),
     }
 

@@ -212,8 +212,8 @@ def floor_sentence(floor: Mapping[str, float | None] | None, *, decimals: int = 
     """Describe the floor by its published values; empty if it is unknown or 0 everywhere.
 
     >>> print(floor_sentence({"mid": 0.36, "mid_crucial": 0.0, "rte": 0.73, "rte_crucial": 0.02}))
-    Floor: the ground truth itself, submitted as predictions, scores MiD 0.36, RTE 0.73 %, RTE on crucial \
-0.02 % and 0 in every other column. This is about the lowest possible score: the protocol \
+    Floor: the ground truth itself, submitted as predictions, scores MiD 0.36, RTE 0.73%, RTE on crucial \
+0.02% and 0 in every other column. This is about the lowest possible score: the protocol \
 truncates predictions, but not the ground truth.
     """
     if not floor or not any(floor.values()):

@@ -41,7 +41,7 @@ class BearerAuthentication(TokenAuthentication):
 
 
 class IsMaintainer(BasePermission):
-    """Lets maintainers in, after a second factor where it is required."""
+    """Lets maintainers in, after two-factor authentication where it is required."""
 
     def has_permission(self, request: Request, view: Any) -> bool:
         return isinstance(request.user, User) and request.user.acts_as_maintainer

@@ -60,7 +60,7 @@ class PublicationSerializer(serializers.Serializer[Publication]):
     """One entry of a split's public changelog."""
 
     at = serializers.DateTimeField(help_text="When the edition was published.")
-    kind = serializers.CharField(help_text="PUBLISHED: a new edition; ROLLED_BACK: a former one.")
+    kind = serializers.CharField(help_text="PUBLISHED: a new edition; ROLLED_BACK: an earlier one.")
     edition = serializers.IntegerField(source="edition.number", help_text=EDITION)
     replaced = serializers.IntegerField(
         source="replaced.number", help_text="Number of the edition it replaced; null: the first.", **NULLABLE

@@ -315,7 +315,7 @@ class EntrySerializer(serializers.Serializer[Entry]):
         allow_null=True, help_text="When the team withdrew the submission; it has no scores."
     )
     is_unscorable = serializers.BooleanField(
-        help_text="In a former edition: whether the published edition cannot score this file."
+        help_text="In an earlier edition: whether the published edition cannot score this file."
     )
     details = DetailsSerializer(help_text=DETAILS)
     n_attempts = serializers.IntegerField(

@@ -90,7 +90,7 @@ class Board:
     filters: Filters = field(default_factory=Filters)
     unfiltered: tuple[Entry, ...] = ()  # all rows, before the filters, in no order
     n_submissions: int = 0  # those of them that are submissions
-    n_left_behind: int = 0  # where there is none: those that former editions scored and this one does not
+    n_left_behind: int = 0  # where there is none: those that earlier editions scored and this one does not
 
     @property
     def n_in_all(self) -> int:
@@ -294,7 +294,7 @@ def _finished_by(at: datetime, *, method: str) -> Q:
 
 
 def unscorable_in(edition: Edition, *, split: Split) -> dict[UUID, str]:
-    """Return submissions that a former edition scored and the published one rejects, with their codes."""
+    """Return submissions that an earlier edition scored and the published one rejects, with their codes."""
     if split.current_edition_id in {None, edition.pk}:
         return {}
     rejected = Evaluation.objects.filter(

@@ -95,7 +95,7 @@ class Entry:
     pseudonym: str = ""  # of one's own anonymous row: under which everybody else sees it
     shown_at: datetime | None = None  # since when everybody sees its method
     withdrawn_at: datetime | None = None  # a tombstone: the row stays, without values
-    unscorable: str = ""  # of a former edition: the code of why the published one cannot score the file
+    unscorable: str = ""  # of an earlier edition: the code of why the published one cannot score the file
 
     @property
     def id(self) -> str:

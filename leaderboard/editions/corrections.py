@@ -202,7 +202,7 @@ def publish(
 def roll_back(
     *, split_name: str, reason: str, now: datetime, actor: User | None, replaces: int | None
 ) -> Publication:
-    """Make the former edition the board again, and queue for it what was submitted since.
+    """Make the earlier edition the board again, and queue for it what was submitted since.
 
     Raises `NotMaintainer` or `Refused`.
     """

@@ -282,7 +282,7 @@ class Edition(UnitOfInference):
         return self.published_at is None and self.discarded_at is None
 
     def ended_at(self, split: Split) -> datetime | None:
-        """Return when a former edition last stopped being the board."""
+        """Return when an earlier edition last stopped being the board."""
         if self.published_at is None or split.current_edition_id == self.pk:
             return None
         ends = Publication.objects.filter(replaced=self).order_by("-at", "-pk")
@@ -317,7 +317,7 @@ class PublishedResultQuerySet(models.QuerySet["PublishedResult"]):
     def on_board(self, split: Split, edition: Edition | None, *, at: datetime | None = None) -> Self:
         """Return the rows on a board now, or at a time when `edition` was the board, in order.
 
-        A former edition keeps its rows for ever.
+        An earlier edition keeps its rows for ever.
         """
         rows = self.filter(split=split).order_by("pk")
         as_of = edition.ended_at(split) if at is None and edition is not None else at

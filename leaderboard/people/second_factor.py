@@ -25,5 +25,7 @@ def reset(*, user: User, reason: str) -> AuditEvent:
     with transaction.atomic():
         n_deleted, _ = Authenticator.objects.filter(user=user).delete()
         if not n_deleted:
-            raise Refused("bad-value", "The account has no second factor; there is nothing to reset.")
+            raise Refused(
+                "bad-value", "The account has no two-factor authentication; there is nothing to switch off."
+            )
         return audit.record_of(user, "second factor reset", details={"reason": reason})

@@ -13,7 +13,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 from leaderboard.web import equations
-from leaderboard.web.formatting import lined
+from leaderboard.web.formatting import lined, unbroken
 
 Target = Callable[[str], str]
 # Where links may lead: pages of any host, mail, and places on this site.
@@ -183,6 +183,7 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
             if not tokens[at + 1].content:
                 token.tag = tokens[at + 2].tag = "td"  # a head without words names nothing
     parts.append(part())
+    _keep_intervals(tokens)
     html = parser.renderer.render(tokens, parser.options, {})
     html = _NAMES.sub(lambda name: _LONG.sub(lambda long: _JOINT.sub("<wbr>", long[0]), name[0]), html)
     html = _CODE.sub(lambda code: _HYPHENED.sub(r'<span class="together">\g<0></span>', code[0]), html)
@@ -190,6 +191,18 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
     # The parser escapes what is no markup of its own.
     drawn = SafeString(html)
     return Document(drawn, tuple(part for part in parts if part.heading.level or part.text))
+
+
+def _keep_intervals(tokens: Sequence[Token]) -> None:
+    """Keep each interval on one line, also one that the source breaks; code stays as it is."""
+    inline = _inline(tokens)
+    for before, gap, after in zip(inline, inline[1:], inline[2:], strict=False):
+        if gap.type == "softbreak" and before.type == after.type == "text":
+            after.content = f"{before.content} {after.content}"
+            before.content, gap.type = "", "text"
+    for child in inline:
+        if child.type == "text":
+            child.content = unbroken(child.content)
 
 
 def _draw_code(token: Token) -> None:

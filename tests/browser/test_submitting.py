@@ -56,7 +56,7 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     press("Enter")
     page.wait_for_url("**/submit/")
     # Chosen already where it is the only one that is open; which splits are is for other tests to say.
-    tab_to(page, "Test The hidden test set: the numbers that papers quote.")
+    tab_to(page, "Test Hidden test set: the results that papers report.")
     press("Space")
     tab_to(page, "Method")
     write("By keyboard")

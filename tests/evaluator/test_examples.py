@@ -59,7 +59,7 @@ def test_toolkit_s_result_file_is_taken_as_it_is(tmp_path: Path) -> None:
     truth = read_truth(EXAMPLES / "truth.csv")
     predictions = read_predictions((EXAMPLES / "predictions.json").read_bytes(), manifest=truth.manifest)
     expected = [
-        f"{name}: MiD {report.scores['overall'].mid:.2f}, RTE {report.scores['overall'].rte:.2f} %"
+        f"{name}: MiD {report.scores['overall'].mid:.2f}, RTE {report.scores['overall'].rte:.2f}%"
         for name in ("toolkit", "tsttc-1")
         for report in [evaluate(predictions, truth, protocol=name)]
     ]

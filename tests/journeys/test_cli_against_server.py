@@ -59,7 +59,9 @@ def test_rejection_has_the_words_of_check(tsttc: Tsttc) -> None:
     offline = tsttc("check", "broken.json", "--manifest", "manifest.csv")
     here = submit(tsttc, "broken.json")
     assert (here.returncode, here.stdout, Submission.objects.count()) == (1, "", 0)
-    assert here.stderr == offline.stderr + "Nothing was submitted; your quota is not used.\n"
+    assert (
+        here.stderr == offline.stderr + "This file was not submitted and did not count against your quota.\n"
+    )
     identity = submitted(tsttc, "broken.json", "--no-check")
     builders.score_all()
     done = tsttc("status", identity)

@@ -251,7 +251,7 @@ class _Follower:
 
 def _in_words(epoch: Epoch) -> str:
     prefix = f"epoch {epoch.number}: loss {epoch.loss:.3f}, " if epoch.number else "before epoch 1: "
-    line = f"{prefix}MiD {epoch.mid:.1f}, RTE {epoch.rte:.1f} %"
+    line = f"{prefix}MiD {epoch.mid:.1f}, RTE {epoch.rte:.1f}%"
     if epoch.learning_rate is not None:
         line += f", learning rate {epoch.learning_rate:.3g}"
     if epoch.n_left_out:
@@ -276,4 +276,4 @@ def _report(epochs: list[Epoch], *, out: Path, as_json: bool) -> None:
     if as_json:
         echo_json({"output": str(out), "best": best.number, "epochs": [asdict(epoch) for epoch in epochs]})
         return
-    click.echo(f"{out}: epoch {best.number} of {len(trained)}, MiD {best.mid:.1f}, RTE {best.rte:.1f} %.")
+    click.echo(f"{out}: epoch {best.number} of {len(trained)}, MiD {best.mid:.1f}, RTE {best.rte:.1f}%.")

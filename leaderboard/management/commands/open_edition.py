@@ -123,6 +123,6 @@ def line(progress: corrections.RescoringProgress) -> str:
     rate = f", {progress.rate_per_s:.1f}/s" if progress.rate_per_s else ""
     left = f", {progress.left_s:.0f} s left" if progress.left_s is not None else ""
     return (
-        f"{progress.percent:3d} %  {progress.n_done} of {progress.n_total}: {progress.n_scored} scored, "
+        f"{progress.percent:3d}%  {progress.n_done} of {progress.n_total}: {progress.n_scored} scored, "
         f"{progress.n_rejected} rejected, {progress.n_failed} with a system error{rate}{left}"
     )

@@ -18,7 +18,9 @@ _MAIL = (
 
 
 class Command(AccountCommand):
-    help = "Remove the second factor of an account whose owner lost it, with its recovery codes."
+    help = (
+        "Switch off two-factor authentication of an account whose owner lost the app and the recovery codes."
+    )
 
     def handle(self, *args: Any, **options: Any) -> None:
         user = account_of(options)
@@ -34,4 +36,4 @@ class Command(AccountCommand):
             now=timezone.now(),
         )
         outbox.queue([mail])
-        self.stdout.write("The second factor is removed. The person is told by mail.")
+        self.stdout.write("Two-factor authentication is off. The person is told by mail.")

@@ -196,11 +196,13 @@ def _on_our_site(address: str) -> str:
 class SecondFactorAdapter(DefaultMFAAdapter):
     error_messages = {
         **DefaultMFAAdapter.error_messages,
-        "cannot_delete_authenticator": "Maintainers of this site must have a second factor.",
-        "cannot_generate_recovery_codes": "Recovery codes need a second factor; set up an app first.",
+        "cannot_delete_authenticator": "Maintainers of this site need two-factor authentication.",
+        "cannot_generate_recovery_codes": "Recovery codes need two-factor authentication; set up an app "
+        "first.",
         "incorrect_code": "The code is wrong, expired or already used; expected the code "
         "that the app shows now.",
-        "unverified_email": "Verify all email addresses of the account before you set up a second factor.",
+        "unverified_email": "Verify all email addresses of the account before you set up two-factor "
+        "authentication.",
     }
 
     def get_totp_issuer(self) -> str:

@@ -51,7 +51,7 @@ class BoardRow:
     cells: tuple[Cell, ...]
     rank_range: str
     source_number: int | None
-    note: str  # why it stays in a former edition
+    note: str  # why it stays in an earlier edition
     attempts: str
     chips: tuple[tuple[str, str], ...]
     is_new: bool

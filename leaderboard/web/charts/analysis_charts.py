@@ -265,7 +265,7 @@ def _side_series(rows: Sequence[Row], name: str, side: str, *, grid: int) -> Ite
             row[side]["share"],
             (
                 f"{tick_text(row['threshold_s'])} s",
-                f"{name} {_side_words(row[side])[1]} %",
+                f"{name} {_side_words(row[side])[1]}%",
                 f"of {counted(row[side]['n'], 'sequence')}",
             ),
         )

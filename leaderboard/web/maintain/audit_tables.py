@@ -39,6 +39,7 @@ _VERBS: Final = {
     "removed_member": "member removed",
     "revoked_invitation": "invitation revoked",
     "cleared": "texts deleted",
+    "second factor reset": "two-factor authentication switched off",
     "hidden": "removed from all boards",
 }
 _NOUNS: Final = {

@@ -89,12 +89,13 @@ _RENAMED: Final = (
 
 @dataclass(frozen=True)
 class Action:
-    """An action of a maintainer: the words of its page, and its function."""
+    """An action of a maintainer: the words of its page, those of its success, and its function."""
 
     model: type[Team | Method | Submission | User]
     heading: str
     lead: str
     button: str
+    done: str
     form: type[ActionForm]
     do: Callable[..., object]
 
@@ -123,6 +124,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Rename the team",
         _RENAMED,
         "Rename",
+        "The team is renamed.",
         RenameForm,
         lambda subject, **arguments: hiding.rename_team(team=subject, **arguments),
     ),
@@ -131,6 +133,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Rename the method",
         _RENAMED,
         "Rename",
+        "The method is renamed.",
         RenameForm,
         lambda subject, **arguments: hiding.rename_method(method=subject, **arguments),
     ),
@@ -139,6 +142,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Delete the texts of the method",
         "Description, paper link and code link are deleted. The team can write new ones.",
         "Delete texts",
+        "The texts are deleted.",
         ActionForm,
         lambda subject, now, **arguments: hiding.clear_texts(method=subject, **arguments),
     ),
@@ -147,6 +151,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Move the method to another team",
         "The method, its submissions and its history belong to the other team from now on.",
         "Move",
+        "The method is moved.",
         MoveForm,
         _move,
     ),
@@ -156,6 +161,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Its scores are removed from every edition. Its row remains on the board, marked with the date. This "
         "cannot be undone.",
         "Withdraw",
+        "The submission is withdrawn.",
         FinalActionForm,
         lambda subject, **arguments: hiding.withdraw_entry(submission=subject, is_hidden=False, **arguments),
     ),
@@ -165,6 +171,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Its scores and its row are removed from all boards, including those of past days. Its team still "
         "sees it as withdrawn. This cannot be undone.",
         "Remove",
+        "The submission is removed.",
         FinalActionForm,
         lambda subject, **arguments: hiding.withdraw_entry(submission=subject, is_hidden=True, **arguments),
     ),
@@ -173,6 +180,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Make the person the owner of the team",
         "They own the team from now on, in place of the present owner, who stays a member.",
         "Make owner",
+        "The person now owns the team.",
         ActionForm,
         _appoint,
     ),
@@ -181,6 +189,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Close the account",
         "Nobody can sign in to it or use its tokens. Its entries remain on the board.",
         "Close account",
+        "The account is closed.",
         ActionForm,
         lambda subject, now, **arguments: hiding.set_active(user=subject, is_active=False, **arguments),
     ),
@@ -189,6 +198,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Open the account again",
         "The person can sign in again.",
         "Open account",
+        "The account is open again.",
         ActionForm,
         lambda subject, now, **arguments: hiding.set_active(user=subject, is_active=True, **arguments),
     ),
@@ -197,6 +207,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "Revoke the API tokens of the person",
         "All of them end at once. The person can create new ones.",
         "Revoke tokens",
+        "The tokens are revoked.",
         ActionForm,
         lambda subject, **arguments: tokens.revoke_all(user=subject, **arguments),
     ),
@@ -206,6 +217,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "The account, its addresses, tokens and invitations are deleted, also file names and notes. "
         "A team without other members loses its name. Scores remain on the board. This cannot be undone.",
         "Forget person",
+        "The person is forgotten.",
         FinalActionForm,
         lambda subject, **arguments: forgetting.forget(user=subject, **arguments),
     ),
@@ -254,7 +266,7 @@ def action(request: HttpRequest, action_name: str, subject_id: str) -> HttpRespo
             given = {name: value for name, value in form.cleaned_data.items() if name != "confirm"}
             arguments = {**given, "actor": maintainer_of(request), "now": timezone.now()}
             chosen.do(subject=subject, **arguments)
-            messages.success(request, f"{chosen.heading}: done.")
+            messages.success(request, chosen.done)
             return redirect("maintain_team", team.pk) if team else redirect("maintain_teams")
     about = {"action": chosen, "subject": _name_of(subject), "team": team}
     return form_page(request, "maintain/action.html", form, **about)

@@ -20,8 +20,8 @@ from leaderboard.people import second_factor
 _SIGN_IN: Final = "account_login"
 _SET_UP: Final = "mfa_activate_totp"
 _SIGN_IN_AGAIN: Final = (
-    "Maintainers of this site need a second factor. To set it up, sign in again: this time the site also "
-    "asks for a code that we mail to you."
+    "Maintainers of this site need two-factor authentication. To set it up, sign in again: this time the "
+    "site also asks for a code that we mail to you."
 )
 
 
@@ -61,7 +61,7 @@ def _lead(request: HttpRequest, step: str) -> HttpResponseBase | None:
         messages.warning(request, _SIGN_IN_AGAIN)
         back = {"next": resolve_url(_SET_UP)}
     elif step == _SET_UP:
-        messages.warning(request, "Maintainers of this site need a second factor. Set it up first.")
+        messages.warning(request, "Maintainers of this site need two-factor authentication. Set it up first.")
         return redirect(step)
     elif request.method not in {"GET", "HEAD"}:
         return redirect(step)

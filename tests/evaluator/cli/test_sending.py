@@ -43,7 +43,10 @@ def test_bad_file_gets_the_words_of_check_and_nothing_is_sent(tsttc: Tsttc, site
     checked = tsttc("check", EXAMPLES / "broken.json", "--manifest", MANIFEST)
     result = submit(tsttc, "broken.json")
     assert (result.exit_code, result.stdout) == (1, "")
-    assert result.stderr == checked.stderr + "Nothing was submitted; your quota is not used.\n"
+    assert (
+        result.stderr
+        == checked.stderr + "This file was not submitted and did not count against your quota.\n"
+    )
     assert paths(site) == [TABLE]
     assert site.requests[0].headers["Authorization"] is None, "a manifest is for everybody"
     document = json.loads(submit(tsttc, "broken.json", "--json").stdout)

@@ -52,7 +52,7 @@ def test_shuffled_values_are_warned_of(driven: GroundTruth) -> None:
 def test_signs_of_the_other_convention_are_reported_as_that(driven: GroundTruth) -> None:
     assert codes(driven, -driven.ttc_s) == ([], ["unlike-truth"])
     [warning] = warnings_with_truth(predicted(driven, -driven.ttc_s), driven)
-    assert "rank correlation is -1.00, and 100 % have the opposite sign" in warning.message
+    assert "rank correlation is -1.00, and 100% have the opposite sign" in warning.message
     assert warning.message.endswith("Probably every sign is wrong: τ is negative when the object moves away.")
 
 
@@ -78,7 +78,7 @@ def test_scale_ratios_without_their_unit_are_distinguished_from_seconds(driven: 
     [
         (lambda ttc_s: -ttc_s, "Probably every sign is wrong"),
         (lambda ttc_s: 1 / ttc_s, "Probably the values are inverse times, 1/τ; expected seconds."),
-        (RNG.permutation, "Probably the anno_ids are those of the toolkit"),
+        (RNG.permutation, "Probably the anno_ids are those of the dataset's toolkit"),
     ],
 )
 def test_sixty_sequences_are_enough_to_name_the_cause(change: Callable[[Floats], Floats], cause: str) -> None:
@@ -129,7 +129,9 @@ def test_submit_warns_before_it_sends_and_sends_all_the_same(
     path = tmp_path / "mine.json"
     path.write_bytes(flat(RNG.permutation(driven.ttc_s).tolist()))
     result = tsttc("submit", path, "--split", "val", "--method", "Foo++")
-    assert result.stderr.startswith("Warning: The values look shuffled: ")
+    assert result.stderr.startswith(
+        "Warning: The predictions seem to be in another order than the sequences. "
+    )
     assert len(site.posts) == 1
 
 

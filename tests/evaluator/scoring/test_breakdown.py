@@ -51,11 +51,11 @@ def test_groups_hold_every_sequence_once_and_average_to_the_whole(report: Report
 
 def test_groups_have_the_words_and_edges_of_the_documents(report: Report) -> None:
     assert [row.group for row in report.breakdown("occlusion")] == (
-        ["0 %", "0–25 %", "25–50 %", "50–100 %", "not stated"]
+        ["0%", "0–25%", "25–50%", "50–100%", "not stated"]
     )
     assert [row.group for row in report.breakdown("lane")] == ["same lane", "other lane"]
     assert [row.group for row in report.breakdown("box-size")] == (
-        ["0–5 %", "5–10 %", "10–20 %", "20–40 %", "over 40 %"]
+        ["0–5%", "5–10%", "10–20%", "20–40%", "over 40%"]
     )
 
 

@@ -74,7 +74,7 @@ def test_check_warns_of_the_toolkit_s_numbers_with_the_command_that_mends_them(
         "from the manifest: the order of files is another one.\n"
     )
     shuffled, numbering = checked.stderr.splitlines()
-    assert shuffled.startswith("Warning: The values look shuffled: ")
+    assert shuffled.startswith("Warning: The predictions seem to be in another order than the sequences. ")
     assert "The values are smooth in the toolkit's numbering only, so the toolkit wrote" in numbering
     command = shlex.split(numbering[numbering.index("tsttc convert") :])
     assert command == ["tsttc", "convert", str(results), "--annotations", str(folder), "-o", "natural.json"]

@@ -92,7 +92,7 @@ def test_nothing_that_is_shown_of_a_split_says_what_its_protocol_does_not_have(
     assert {path: each for path, each in words.items() if each} == {}
 
     text = {path.removeprefix("None "): body.decode() for path, body in bodies.items()}
-    assert "RTE 5.0 %" in text[f"/methods/{first.pk}/badge.svg?split=test"]
+    assert "RTE 5.0%" in text[f"/methods/{first.pk}/badge.svg?split=test"]
     assert "Ranked by overall RTE" in text["/board/test/"]
     assert "(0, 5] s" in text["/board/test/"]
     assert "RTE, % (log scale)" in text["/board/test/charts/"]

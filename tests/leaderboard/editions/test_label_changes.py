@@ -1,4 +1,4 @@
-"""A correction can be looked at before anything is kept, and manifests of former editions stay to be had."""
+"""A correction can be looked at before anything is kept, and manifests of earlier editions stay to be had."""
 
 import csv
 import stat

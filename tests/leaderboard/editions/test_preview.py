@@ -1,4 +1,4 @@
-"""Looking before switching, and what former editions and withdrawn entries leave."""
+"""Looking before switching, and what earlier editions and withdrawn entries leave."""
 
 import random
 from pathlib import Path
@@ -114,6 +114,6 @@ def test_the_command_opens_an_edition_follows_it_and_says_where_to_publish(
     builders.score_all()
     call_command("open_edition", "test", "--truth", str(corrected(tmp_path, factor=1.3)), "--wait")
     output = capsys.readouterr().out
-    assert "100 %  4 of 4: 4 scored, 0 rejected, 0 with a system error" in output
+    assert "100%  4 of 4: 4 scored, 0 rejected, 0 with a system error" in output
     assert "5 changed; 0 sequences have another anno_id." in output
     assert output.rstrip().endswith("/maintain/test/editions/2/")

@@ -27,7 +27,7 @@ CHANGES = re.compile(rb'<section aria-labelledby="changes">.*?</section>', re.DO
 
 
 def representations(client: Client, at: datetime) -> dict[str, bytes]:
-    """A board of the past and a former edition, in every format."""
+    """A board of the past and an earlier edition, in every format."""
     moment = f"{at.astimezone(UTC):%Y-%m-%dT%H:%M:%S.%fZ}"
     past = [f"/board/test{form}?at={moment}" for form in ("/", ".csv", ".tex", ".md")]
     api = [f"/api/v1/splits/test/board?at={moment}", "/api/v1/splits/test/editions/1/board"]
@@ -96,7 +96,7 @@ def test_a_board_that_stands_has_every_row_and_a_former_one_those_of_its_time(
     quote("second")
     roll_back()
     quote("first-again")
-    # The first edition is the board again, so it has what came meanwhile; the second is a former one.
+    # The first edition is the board again, so it has what came meanwhile; the second is an earlier one.
     assert {"Second", "First-Again"} <= set(on_board())
     second = client.get("/board/test/editions/2.csv").text
     assert "Second" in second

@@ -85,7 +85,7 @@ def test_the_words_are_true_wherever_they_stand(
     publish(adding, leave_out=True)
     board = assert_sound(client.get("/board/test/")).one("main").text
     assert "no submissions yet" not in board
-    assert "Edition 2 has no scored submission yet; 1 submission keeps its result in former editions" in board
+    assert "Edition 2 has no scored submission yet: submit a file for the new manifest; 1 submission" in board
     client.force_login(owner)
     text = "Edition 2 cannot score this file. It keeps its result in edition 1, and your quota is refunded."
     page = assert_sound(client.get(f"/submissions/{sent.pk}/"))

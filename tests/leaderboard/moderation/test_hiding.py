@@ -29,6 +29,7 @@ from leaderboard.models import (
 from leaderboard.moderation import forgetting, hiding
 from leaderboard.people import teams
 from leaderboard.upkeep import pollers
+from leaderboard.web.maintain.moderation_views import ACTIONS
 from tests import builders
 from tests.leaderboard.web.maintain.desk import get
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -63,6 +64,14 @@ def do(keeper: Client, action: str, subject: object, **fields: str) -> None:
     assert "No reason was given" in assert_sound(refused).one("div", class_="wrong").text
     answer = keeper.post(address, {"reason": "A complaint.", "confirm": "on", **fields})
     assert answer.status_code == 302, assert_sound(answer).one("main").text
+    assert ACTIONS[action].done in assert_sound(keeper.get(answer.headers["Location"])).text
+
+
+def test_each_action_says_in_its_own_words_that_it_is_done() -> None:
+    sentences = {name: action.done for name, action in ACTIONS.items()}
+    assert len(set(sentences.values())) == len(ACTIONS)
+    assert sentences["rename-method"] == "The method is renamed."
+    assert sentences["close-account"] == "The account is closed."
 
 
 def test_renamed_and_masked_names_are_gone_from_board_exports_feed_search_and_the_past(

@@ -54,6 +54,15 @@ def test_a_page_has_no_title_of_its_own_and_headings_have_anchors() -> None:
     ]
 
 
+def test_an_interval_stays_on_one_line_and_the_search_has_it_as_typed() -> None:
+    drawn = markdown.page("From 1 to 5, **−2 to\n0.4**, 3\nto 4 and `6 to 7`; back\nto it.\n")
+    source = str(drawn.html)
+    for interval in ("1 to 5", "−2 to 0.4", "3 to 4"):
+        assert interval.replace(" ", "\N{NO-BREAK SPACE}") in source
+    assert "<code>6 to 7</code>; back to it." in source
+    assert drawn.parts[0].text == "From 1 to 5, −2 to 0.4, 3 to 4 and 6 to 7; back to it."
+
+
 def test_a_column_without_a_name_has_no_head_and_numbers_stand_right() -> None:
     root = pages.read(markdown.page("| | n |\n|---|--:|\n| a | 1 |\n").html)
     assert [each.text for each in root.all("th")] == ["n"]

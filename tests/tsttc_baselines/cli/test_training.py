@@ -58,7 +58,7 @@ def test_a_training_tells_its_plan_its_rate_and_where_it_continues_and_keeps_a_l
     for line, row in zip(epochs, rows, strict=True):
         mid, rate = float(row["mid"]), float(row["learning_rate"])
         assert line.startswith(f"epoch {row['epoch']}: loss {float(row['loss']):.3f}, MiD {mid:.1f}, RTE ")
-        assert line.endswith(f" %, learning rate {rate:.3g}")
+        assert line.endswith(f"%, learning rate {rate:.3g}")
 
 
 @pytest.mark.torch

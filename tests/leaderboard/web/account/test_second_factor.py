@@ -224,7 +224,7 @@ def test_maintainers_who_must_have_one_are_led_to_it_and_see_nothing_more_before
     assert sign_in(client, keeper) == "/accounts/login/code/confirm/"
     client.post("/accounts/login/code/confirm/", {"code": mailed_code()})
     assert client.get("/maintain/").headers["Location"] == SET_UP
-    assert "need a second factor" in client.get("/accounts/reauthenticate/").text
+    assert "need two-factor authentication" in client.get("/accounts/reauthenticate/").text
     set_up(client, phone)
     # Sessions from before are no better for it: neither shows its pages without a code.
     for session in (later, client):
@@ -238,7 +238,7 @@ def test_maintainers_who_must_have_one_are_led_to_it_and_see_nothing_more_before
         assert {session.get(path).status_code for path in (*of_another, *of_maintainers)} == {200}
 
     refused = client.post("/accounts/2fa/totp/deactivate/")
-    assert "Maintainers of this site must have a second factor." in refused.text
+    assert "Maintainers of this site need two-factor authentication." in refused.text
     assert Authenticator.objects.filter(user=keeper, type="totp").exists()
 
 
@@ -347,7 +347,7 @@ def test_a_maintainer_resets_the_second_factor_of_another_with_a_reason(owner: U
     [
         ("nobody@example.org", "lost", "no account with that address"),
         ("owner@example.org", " ", "'reason' is empty"),
-        ("owner@example.org", "lost", "has no second factor"),
+        ("owner@example.org", "lost", "has no two-factor authentication"),
     ],
 )
 def test_what_cannot_be_reset_has_a_message(owner: User, email: str, reason: str, message: str) -> None:

@@ -46,7 +46,7 @@ def test_former_edition_keeps_its_board_and_names_its_successor(
     root = get(client, OLD)
     assert pages.board_rows(root) == before
     notice = root.one("p", class_="notice")
-    assert notice.text.startswith(f"Replaced by edition 2 on {changed_on()}. “Labels corrected.”")
+    assert notice.text.startswith(f"Replaced by edition 2 on {changed_on()} (“Labels corrected.”); see")
     assert [a.attributes["href"] for a in notice.all("a")] == [NEW, "/board/test/"]
     assert pages.board_rows(get(client, NEW)) == pages.board_rows(get(client, "/board/test/")) != before
 
@@ -73,7 +73,7 @@ def test_edition_that_was_taken_back_says_so_and_keeps_its_board(client: Client,
     root = get(client, NEW)
     assert pages.board_rows(root) == before
     assert "Rolled back to edition 1 on" in root.one("p", class_="notice").text
-    assert ". “A mistake.”" in root.one("p", class_="notice").text
+    assert " (“A mistake.”); see" in root.one("p", class_="notice").text
     assert "again: “A mistake.”" in facts(get(client, OLD))["Published"]
 
 

@@ -100,6 +100,9 @@ def search_hits(client: Client, query: str) -> list[tuple[str, str]]:
     ("query", "address"),
     [
         ("quota", "/docs/access/#quotas"),
+        ("how many files", "/docs/faq/#how-many-files-may-i-send"),
+        ("how many files may I send", "/docs/access/#quotas"),
+        ("how many submissions", "/docs/access/#quotas"),
         ("quota-exceeded", "/docs/problem-codes/#rates-and-quotas"),
         ("bootstr", "/docs/uncertainty/"),
         ("how to submit", "/docs/cli/#submit"),
@@ -167,9 +170,9 @@ def test_the_first_page_names_a_split_that_is_open_or_says_that_none_is(
 
     assert "--split test --method" in commands()
     Split.objects.filter(pk="test").update(closes_at=timezone.now())
-    assert "No split is open for submissions now. Dates" in commands()
+    assert "No split is open for submissions now (dates)." in commands()
     Split.objects.update(current_edition=None)
-    assert "Replace SPLIT with the name of an open one" in commands()
+    assert "; replace SPLIT with the name of one that is" in commands()
     assert "--split SPLIT --method" in commands()
 
 

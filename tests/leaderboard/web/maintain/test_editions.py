@@ -63,7 +63,7 @@ def test_desk_shows_each_split_with_its_board_and_what_is_prepared(keeper: Clien
     assert "edition 1, published" in test
     draft = root.all("div", class_="preparing")[0].text
     assert draft.startswith("Test, edition 2 draft since")
-    assert "0 %. 0 of 4 submissions finished." in draft
+    assert "0%. 0 of 4 submissions finished." in draft
     assert "none: no ground truth yet" in val
     assert "python manage.py import_truth val PATH" in main_text(keeper, "/maintain/val/open/")
     bar = root.one("progress")
