@@ -172,8 +172,8 @@ def _is_key(model: type[Model], text: str) -> bool:
 
 
 def _submission(row: Submission) -> Subject:
-    sent = f"sent {row.submitted_at:%Y-%m-%d %H:%M} UTC"
-    return Subject(f"{row.method.name} on {row.split.title}", reverse("submission", args=[row.pk]), sent)
+    about = f"submitted {row.submitted_at:%Y-%m-%d %H:%M} UTC"
+    return Subject(f"{row.method.name} on {row.split.title}", reverse("submission", args=[row.pk]), about)
 
 
 def _evaluation(row: Evaluation) -> Subject:

@@ -146,7 +146,8 @@ def test_an_evaluation_names_its_edition_and_why_its_file_was_rejected(
         builders.submit(owner, data, method=method)
     builders.score_all()
     sent = {
-        row.method.name: f"sent {row.submitted_at:%Y-%m-%d %H:%M} UTC" for row in Submission.objects.all()
+        row.method.name: f"submitted {row.submitted_at:%Y-%m-%d %H:%M} UTC"
+        for row in Submission.objects.all()
     }
     broken, owl = sorted(row[4] for row in rows(keeper.get(PAGE)) if row[3] in {"scored", "rejected"})
     assert owl == f"Evaluation Owl net on Test, edition 1, {sent['Owl net']}"
