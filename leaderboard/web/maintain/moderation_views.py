@@ -98,6 +98,7 @@ class Action:
     done: str
     form: type[ActionForm]
     do: Callable[..., object]
+    destroys: bool = False
 
 
 def _move(*, subject: Method, name: str, now: object, **arguments: Any) -> None:
@@ -145,6 +146,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "The texts are deleted.",
         ActionForm,
         lambda subject, now, **arguments: hiding.clear_texts(method=subject, **arguments),
+        destroys=True,
     ),
     "move-method": Action(
         Method,
@@ -164,6 +166,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "The submission is withdrawn.",
         FinalActionForm,
         lambda subject, **arguments: hiding.withdraw_entry(submission=subject, is_hidden=False, **arguments),
+        destroys=True,
     ),
     "hide": Action(
         Submission,
@@ -174,6 +177,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "The submission is removed.",
         FinalActionForm,
         lambda subject, **arguments: hiding.withdraw_entry(submission=subject, is_hidden=True, **arguments),
+        destroys=True,
     ),
     "appoint-owner": Action(
         User,
@@ -220,6 +224,7 @@ ACTIONS: Final[Mapping[str, Action]] = {
         "The person is forgotten.",
         FinalActionForm,
         lambda subject, **arguments: forgetting.forget(user=subject, **arguments),
+        destroys=True,
     ),
 }
 

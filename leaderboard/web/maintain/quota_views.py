@@ -1,5 +1,6 @@
 """Quotas for maintainers: rules, overrides, admissions."""
 
+from collections.abc import Mapping
 from uuid import UUID
 
 from django.conf import settings
@@ -77,7 +78,7 @@ def end_override(request: HttpRequest, team_id: UUID, split: str) -> HttpRespons
         return redirect("maintain_team_quotas", team_id)
     lead = "The rules of the split apply to the team again from the next submission."
     words = {"heading": "Delete the override for", "lead": lead, "button": "Delete override"}
-    return _form(request, form, team=own.team, split=own.split, own=own, words=words)
+    return _form(request, form, team=own.team, split=own.split, own=own, words={**words, "destroys": True})
 
 
 @maintainers_form
@@ -119,7 +120,7 @@ def _form(
     team: Team,
     split: Split,
     own: QuotaOverride | None,
-    words: dict[str, str],
+    words: Mapping[str, str | bool],
 ) -> HttpResponse:
     quota = usage.state(team=team, user=maintainer_of(request), split=split, now=timezone.now())
     about = {

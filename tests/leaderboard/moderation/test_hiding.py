@@ -118,6 +118,20 @@ def test_what_cannot_be_undone_asks_maintainers_for_the_tick(
     assert sent.hidden_at is None
 
 
+def test_what_a_maintainer_deletes_is_red_where_it_is_offered_and_asked(
+    keeper: Client, edition: Edition, owner: User
+) -> None:
+    sent = published(edition, owner)
+    team = get(keeper, f"/maintain/teams/{sent.method.team_id}/")
+    for action, subject in (("clear-texts", sent.method_id), ("hide", sent.pk), ("withdraw", sent.pk)):
+        address = f"/maintain/actions/{action}/{subject}/"
+        assert team.one("a", href=address).attributes["class"] == "as-link danger"
+        assert get(keeper, address).one("main").one("button").attributes["class"] == "danger"
+    rename = f"/maintain/actions/rename-method/{sent.method_id}/"
+    assert "class" not in team.one("a", href=rename).attributes
+    assert "class" not in get(keeper, rename).one("main").one("button").attributes
+
+
 def test_a_hidden_entry_leaves_boards_of_all_times_and_a_withdrawn_one_its_values(
     keeper: Client, edition: Edition, owner: User
 ) -> None:

@@ -231,6 +231,16 @@ def test_what_is_wrong_has_a_reason_at_its_field_and_changes_nothing(
     assert not AuditEvent.objects.filter(verb="quota_overridden").exists()
 
 
+def test_deleting_an_override_is_red_and_saving_one_is_not(
+    keeper: Client, team: Team, override: QuotaOverride
+) -> None:
+    end = address(team, "test", "end")
+    for page in (QUOTAS, address(team)):
+        assert get(keeper, page).one("a", href=end).attributes["class"] == "as-link danger"
+    assert get(keeper, end).one("main").one("button").attributes["class"] == "danger"
+    assert "class" not in get(keeper, address(team, "test")).one("main").one("button").attributes
+
+
 def test_override_ends_with_a_reason_and_on_the_record(
     keeper: Client, team: Team, override: QuotaOverride, maintainer: User
 ) -> None:
