@@ -6,7 +6,7 @@ from django import forms
 
 from evaluator.metrics.protocol import PROTOCOLS, Protocol
 from leaderboard.models import GroundTruth, Split
-from leaderboard.web.forms import SiteForm
+from leaderboard.web.forms import SiteForm, confirmation
 
 _STALE: Final = "The form lacks the current edition; reload the page."
 
@@ -76,3 +76,4 @@ class PublishForm(RollBackForm):
 
 class DiscardForm(ReasonForm):
     reason = reason_field("Required: one sentence for the audit log.")
+    confirm = confirmation()

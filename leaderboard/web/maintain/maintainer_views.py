@@ -182,9 +182,8 @@ def discard(request: HttpRequest, split: str, number: int) -> HttpResponse:
     form = DiscardForm.asked(request)
     if form.is_valid():
         with form.refusals():
-            corrections.discard(
-                edition=row, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
-            )
+            reason, actor = form.cleaned_data["reason"], maintainer_of(request)
+            corrections.discard(edition=row, now=timezone.now(), actor=actor, reason=reason)
             messages.success(request, f"Edition {number} of {split} was discarded.")
             return redirect("maintain")
     return form_page(request, "maintain/discard.html", form, **_comparison(row))

@@ -151,7 +151,11 @@ def test_rolling_back_returns_the_board_as_it_was(
 
 def test_giving_up_ends_a_preparation_and_its_work(keeper: Client, second: Edition, maintainer: User) -> None:
     assert "4 queued evaluations are cancelled" in main_text(keeper, f"{SECOND}discard/")
-    response = keeper.post(f"{SECOND}discard/", {"reason": "The wrong file."}, follow=True)
+    data = {"reason": "The wrong file."}
+    unsure = keeper.post(f"{SECOND}discard/", data)
+    assert (unsure.status_code, AuditEvent.objects.filter(verb="discarded").count()) == (422, 0)
+    assert "tick the box" in assert_sound(unsure).one("div", class_="wrong").text
+    response = keeper.post(f"{SECOND}discard/", {**data, "confirm": "on"}, follow=True)
     assert response.redirect_chain == [(HUB, 302)]
     assert "Compare and decide" not in assert_sound(response).one("main").text
     event = AuditEvent.objects.filter(verb="discarded").get()
