@@ -9,6 +9,7 @@ from django.utils.functional import SimpleLazyObject
 
 from leaderboard.boards.snapshots import site_line_of, splits_of
 from leaderboard.models import PageVersion
+from leaderboard.people import addresses
 from leaderboard.web.lookups import page_before
 
 # The first that a path begins with is its section in the navigation.
@@ -45,6 +46,7 @@ def site(request: HttpRequest) -> dict[str, Any]:
         "section": _section(request),
         # Those that people can sign in with: the word in addresses, and the name that people know.
         "providers": [(name, set_["APP"]["name"]) for name, set_ in settings.SOCIALACCOUNT_PROVIDERS.items()],
+        "proves_addresses": addresses.are_proved(),
         "splits": SimpleLazyObject(lambda: splits_of(request)),
         "announcements": _announcements(request),
         "came_from": SimpleLazyObject(lambda: _came_from(request)),

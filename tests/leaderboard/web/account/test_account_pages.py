@@ -7,6 +7,7 @@ from allauth.account.models import EmailAddress
 from django.core import mail
 from django.http import HttpResponseBase
 from django.test import Client
+from pytest_django.fixtures import Settings
 
 from leaderboard.models import Edition, User
 from tests import builders, pages
@@ -71,6 +72,18 @@ def test_page_of_addresses_offers_only_what_applies(signed_in: Client, owner: Us
     assert offered() == ["add"]
     EmailAddress.objects.create(user=owner, email="second@example.org", verified=True)
     assert offered() == ["primary", "remove", "add"]
+
+
+def test_page_of_addresses_says_what_an_unproved_one_lacks_where_it_lacks_it(
+    signed_in: Client, owner: User, settings: Settings
+) -> None:
+    cost = "No notifications are sent to it."
+    first = EmailAddress.objects.create(user=owner, email=owner.email, verified=False, primary=True)
+    assert cost not in pages.get(signed_in, "/accounts/email/").text, "this site proves no addresses"
+    settings.ACCOUNT_EMAIL_VERIFICATION = "mandatory"
+    assert cost in pages.get(signed_in, "/accounts/email/").text
+    EmailAddress.objects.filter(pk=first.pk).update(verified=True)
+    assert cost not in pages.get(signed_in, "/accounts/email/").text
 
 
 def test_forgotten_password_is_reset_by_a_link(client: Client, owner: User, benchmark: None) -> None:
