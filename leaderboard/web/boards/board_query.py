@@ -157,7 +157,8 @@ def tools(
             if name in query.filters.wanted
             for label in ["Search" if name == _SEARCH else each.label]
         ],
-        # Whether any filter is set, besides the text to find: else they need no room.
+        # The panel of filters is open only for a fault in it: chips name what is set.
+        "has_fault": any(field["fault"] for field in fields),
         "has_choices": any(text for name, text in given.items() if name != _SEARCH),
         "sentence": sentence(board, is_filtered=query.filters.is_set),
         "clear_href": query.href(**dict.fromkeys(FILTERS, "")),

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from django.http import HttpResponseBase
 from django.test import Client
 
 from evaluator import SCORE_NAMES
@@ -119,6 +120,18 @@ def test_filters_and_search_show_what_fits_and_keep_the_ranks(
         assert len(matches) == len(expected), query
         assert all(everything[row[1]] == row[0] for row in matches)
         assert f"{len(matches)} of {len(everything)} results" in root.one("main").text
+
+
+def test_chips_say_what_is_filtered_and_the_panel_opens_for_a_fault_alone(
+    client: Client, inferred: list[Submission]
+) -> None:
+    def panel(response: HttpResponseBase) -> pages.Element:
+        return pages.page(response).one("details", class_="filters-of-board")
+
+    filtered = client.get("/board/test/?frames=2")
+    assert "open" not in panel(filtered).attributes
+    assert [chip.text for chip in pages.page(filtered).all("a", class_="chip")] == ["Frames used: 2"]
+    assert "open" in panel(client.get("/board/test/?frames=9")).attributes
 
 
 def test_filters_that_nothing_fits_leave_a_sentence_and_a_way_back(
