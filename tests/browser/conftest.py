@@ -26,7 +26,7 @@ from allauth.account.models import EmailAddress
 from django.db import transaction
 from django.utils import timezone
 from leaderboard import board_versions
-from leaderboard.models import Method, Split, Submission, User
+from leaderboard.models import Evaluation, Method, Publication, Split, Submission, User
 from leaderboard.people import teams
 from tests import board_rows
 user = User.objects.create_user({BOARD_OWNER!r}, {PASSWORD!r}, name="Owners")
@@ -38,6 +38,10 @@ own.update(name="B" * 80, visibility="PRIVATE", team=teams.team_of(user=user))
 for rest, days in ((0, 40), (1, 20)):
     earlier = Submission.objects.filter(method__in=methods[rest::3])
     earlier.update(submitted_at=timezone.now() - timedelta(days=days))
+# There was a board yesterday.
+Publication.objects.filter(edition__split="demo").update(at=timezone.now() - timedelta(days=50))
+scored = Evaluation.objects.filter(submission__method__in=methods)
+scored.update(finished_at=timezone.now() - timedelta(days=2))
 with transaction.atomic():
     board_versions.bump("demo")
 """
