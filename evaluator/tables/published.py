@@ -87,6 +87,14 @@ class PrintedTable:
         return f"Section {', '.join(self.table.section.split(' ', 1))}"
 
     @property
+    def subject(self) -> str:
+        """The split and the method of all rows, such as "Split val, Deep Scale"; empty where rows differ."""
+        splits = {row.split for row in self.table.rows if row.split}
+        methods = {method_name(row) for row in self.table.rows if row.method}
+        words = [f"Split {split}" for split in splits if len(splits) == 1]
+        return ", ".join(words + [method for method in methods if len(methods) == 1])
+
+    @property
     def units(self) -> str:
         if not self.table.is_result:
             return ""

@@ -88,6 +88,13 @@ def test_latex_and_markdown_mark_the_default_and_have_notes_and_source() -> None
         assert "2309.01539" in text
 
 
+def test_split_and_method_of_a_table_are_named_where_no_column_has_them() -> None:
+    subjects = {shown.table.name: shown.subject for shown in printed_tables()}
+    assert subjects["ablation-kernel-size"] == "Split val, Deep Scale"
+    assert subjects["ablation-frame-gap"] == "Split val"
+    assert subjects["main-results"] == ""
+
+
 def test_every_table_has_every_format() -> None:
     for shown in printed_tables():
         assert all(WRITERS[name](shown).endswith("\n") for name in WRITERS), shown.table.name
