@@ -101,7 +101,7 @@ def _add_crops(figure: Figure, clip: Clip, estimator: PixelMse, match: Match, fr
         Picture(strong, right, below, side, side),
         outline(
             [v if i % 2 == 0 else v + below - top for i, v in enumerate(theirs.to_figure(target_box))],
-            colour=colours.mark,
+            colour=colours.accent,
             width=1,
         ),
     ]

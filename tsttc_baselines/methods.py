@@ -53,7 +53,7 @@ class Parameter:
 
     @property
     def option(self) -> str:
-        """The option on the command line, such as `--frame-gap`."""
+        """The option on the command line, such as `--bins`."""
         return "--" + self.name.replace("_", "-")
 
 
@@ -124,7 +124,7 @@ PUBLISHED_FILES: Final = {
 """Weights of published rows, by their SHA-256: the toolkit's checkpoint."""
 
 OWN_WEIGHTS: Final = Path(__file__).parent / "deep_scale" / "rendered.npz"
-"""The weights that come with the package, trained on rendered frames."""
+"""The path of the weights that come with the package, trained on rendered frames."""
 
 METHODS: Final[tuple[Method, ...]] = (
     Method(

@@ -46,7 +46,7 @@ class Pair:
 
 
 class Source(Protocol):
-    """Sequences with true times to contact."""
+    """Sequences with true times to contact, to train on: an object with these properties and this method."""
 
     @property
     def truth(self) -> GroundTruth:

@@ -61,9 +61,11 @@ SHAPES: Final = _shapes()
 class Use:
     """How weights are used; the defaults are the toolkit's.
 
-    `similarity` is "cosine" in the paper, "dot" for the toolkit's weights. `n_cells` is the paper's target
-    size. Frames are shrunk until the target's box has at most `max_box_px` on its longer side; crops have
-    `margin_px` around. `decoding` is as in `DeepScale`.
+    - `similarity`: "cosine" as in the paper, or "dot" (scalar product) for the toolkit's weights.
+    - `n_cells`: cells of the target's box in each direction, the paper's target size.
+    - `max_box_px`: frames are shrunk until the longer side of the target's box has at most so many pixels.
+    - `margin_px`: pixels around what is compared.
+    - `decoding`: "head" for the paper's estimate, or "fit" for the fit of the features.
     """
 
     similarity: Similarity = "dot"

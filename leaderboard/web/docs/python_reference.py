@@ -77,7 +77,9 @@ SECTIONS: Final[dict[str, dict[str, dict[str, tuple[str, ...]]]]] = {
         },
         "Networks": {
             "tsttc_baselines.torch": ("BoxCrops", "crops_of", "crops_of_clip"),
-            "tsttc_baselines.deep_scale.weights": ("read_weights", "write_weights", "Weights"),
+            "tsttc_baselines.pairs": ("Source",),
+            "tsttc_baselines.deep_scale.weights": ("read_weights", "write_weights", "Weights", "Use"),
+            "tsttc_baselines.methods": ("OWN_WEIGHTS",),
         },
     },
 }
