@@ -125,7 +125,8 @@ def unbroken(text: str) -> str:
     >>> unbroken("lower (2.9 to 5.3)").split(" ")
     ['lower', '(2.9\\xa0to\\xa05.3)']
     """
-    return _BETWEEN_ENDS.sub("\N{NO-BREAK SPACE}to\N{NO-BREAK SPACE}", text)
+    # Most texts of a table have none.
+    return text if " to " not in text else _BETWEEN_ENDS.sub("\N{NO-BREAK SPACE}to\N{NO-BREAK SPACE}", text)
 
 
 def breakable(path: str) -> SafeString:
