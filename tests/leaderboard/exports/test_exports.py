@@ -244,6 +244,8 @@ def test_a_team_finds_nothing_to_paste_that_names_its_anonymous_method(
         assert sent.method.pseudonym in text
         assert "secret" not in text.lower()
         assert sent.method.team.name not in text
+    assert "Do not show the signed receipt while the method is anonymous" in page.text
+    assert "tsttc verify" not in page.text
 
 
 @pytest.fixture
