@@ -60,7 +60,7 @@ class InvitationAdmin(ReadOnlyAdmin):
 class ApiTokenAdmin(ReadOnlyAdmin):
     list_display = ["name", "token_key", "user", "created", "expiry", "last_used_at", "revoked_at"]
     fields = [
-        *("name", "token_key", "user", "may_read", "may_submit", "split"),
+        *("name", "token_key", "user", "may_read", "may_submit", "may_publish", "split"),
         *("created", "expiry", "last_used_at", "revoked_at"),
     ]
     search_fields = ["token_key", "name", "user__email"]

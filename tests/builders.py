@@ -16,7 +16,7 @@ from leaderboard import board_versions
 from leaderboard.editions import ground_truth
 from leaderboard.methods import editing
 from leaderboard.methods import visibility as visibility_verbs
-from leaderboard.models import Edition, PublishedResult, QuotaOverride, Split, Submission, Team, User
+from leaderboard.models import Edition, PublishedResult, QuotaOverride, Scope, Split, Submission, Team, User
 from leaderboard.people import tokens
 from leaderboard.queue import worker
 from leaderboard.quotas import usage
@@ -113,6 +113,7 @@ def quote(name: str, scores: dict[str, float]) -> PublishedResult:
 
 def token(user: User, **options: Any) -> str:
     """A new token of that person, which may do everything."""
+    options = {"scopes": Scope.values, **options}
     return tokens.create(user=user, name="CI", now=timezone.now(), **options)
 
 

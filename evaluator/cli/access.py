@@ -130,6 +130,8 @@ def publish(
 ) -> None:
     """Publish METHOD, the name or id of a method of your team. This cannot be undone.
 
+    The token needs the scope publish, which a new token has only if you tick it.
+
     New methods are private: only your team and the maintainers see them. An anonymous method shows its
     scores under a pseudonym and can become public later. The command shows a preview before it asks for
     confirmation.

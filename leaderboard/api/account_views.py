@@ -26,7 +26,7 @@ from leaderboard.quotas import admissions
 
 
 class AccountView(APIView):
-    token_scopes = (Scope.READ, Scope.SUBMIT)
+    token_scopes = tuple(Scope)
 
     @extend_schema(operation_id="account", responses=AccountSerializer)
     def get(self, request: Request) -> Response:
@@ -37,7 +37,7 @@ class AccountView(APIView):
 
 class QuotaView(APIView):
     # A token that can only submit needs to know when it may.
-    token_scopes = (Scope.READ, Scope.SUBMIT)
+    token_scopes = tuple(Scope)
 
     @extend_schema(operation_id="quota", responses=QuotaSerializer(many=True))
     def get(self, request: Request) -> Response:

@@ -17,7 +17,8 @@ from leaderboard.people import second_factor, tokens
 class BearerAuthentication(TokenAuthentication):
     """`Authorization: Bearer tsttc_…` alone. Checks the token's limits before any view.
 
-    Safe methods need the scope `read` and all others `submit`, unless the view has `token_scopes`.
+    Safe methods need the scope `read` and all others `submit`, or the view's `writing_scope`; a view with
+    `token_scopes` accepts any of them.
     """
 
     def authenticate(self, request: Request) -> tuple[User, ApiToken] | None:
@@ -25,7 +26,9 @@ class BearerAuthentication(TokenAuthentication):
         user_and_token: tuple[User, ApiToken] | None = super().authenticate(request)
         if user_and_token is not None:
             view = request.parser_context["view"]
-            usual = Scope.READ if request.method in SAFE_METHODS else Scope.SUBMIT
+            usual = (
+                Scope.READ if request.method in SAFE_METHODS else getattr(view, "writing_scope", Scope.SUBMIT)
+            )
             _require_scope(user_and_token[1], getattr(view, "token_scopes", (usual,)))
             if "split" in view.kwargs:
                 require_split(user_and_token[1], view.kwargs["split"])

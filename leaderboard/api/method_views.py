@@ -36,7 +36,7 @@ from leaderboard.boards.visibility_preview import BoardPreview, RankChange, Visi
 from leaderboard.errors.refusals import Refused
 from leaderboard.methods import details, editing, visibility
 from leaderboard.methods.visibility import notice_of
-from leaderboard.models import Method, User, Visibility
+from leaderboard.models import Method, Scope, User, Visibility
 
 
 class MethodSerializer(serializers.Serializer[Method]):
@@ -231,6 +231,7 @@ AS = OpenApiParameter(
 
 class VisibilityView(APIView):
     parser_classes = [LimitedJSONParser]
+    writing_scope = Scope.PUBLISH
 
     @extend_schema(
         operation_id="preview_visibility",
@@ -253,7 +254,10 @@ class VisibilityView(APIView):
         responses={200: MethodSerializer, **errors(404, 422)},
     )
     def post(self, request: Request, method_id: UUID) -> Response:
-        """Publish your method, anonymous or public. Cannot be undone: needs `confirm`."""
+        """Publish your method, anonymous or public.
+
+        This cannot be undone: it needs `confirm`, and a token needs the scope `publish`.
+        """
         method, fields = _own(request, method_id), _fields(request)
         if fields.get("confirm") is not True:
             sentence = "Publishing a method cannot be undone; expected the field 'confirm' to be true."

@@ -173,7 +173,7 @@ class AccountSerializer(serializers.Serializer[Any]):
         child=serializers.CharField(),
         default=list,
         read_only=True,
-        help_text="What the token may do: `read`, `submit`.",
+        help_text="What the token may do: `read`, `submit`, `publish`.",
     )
     split = serializers.CharField(
         source="token.split_id", help_text="Only split that it is for; null: all.", **NULLABLE

@@ -142,6 +142,7 @@ class Invitation(models.Model):
 class Scope(models.TextChoices):
     READ = "read", "read"
     SUBMIT = "submit", "submit"
+    PUBLISH = "publish", "publish"
 
 
 class ApiToken(AbstractAuthToken):
@@ -150,6 +151,7 @@ class ApiToken(AbstractAuthToken):
     name = models.CharField(max_length=80)
     may_read = models.BooleanField(default=True)
     may_submit = models.BooleanField(default=True)
+    may_publish = models.BooleanField(default=False)
     split = models.ForeignKey(
         "Split",
         null=True,
@@ -165,7 +167,7 @@ class ApiToken(AbstractAuthToken):
         verbose_name = "API token"
         constraints = [
             models.CheckConstraint(
-                condition=models.Q(may_read=True) | models.Q(may_submit=True),
+                condition=models.Q(may_read=True) | models.Q(may_submit=True) | models.Q(may_publish=True),
                 name="token_is_good_for_something",
             ),
         ]
@@ -175,5 +177,9 @@ class ApiToken(AbstractAuthToken):
 
     @property
     def scopes(self) -> tuple[str, ...]:
-        granted = {Scope.READ: self.may_read, Scope.SUBMIT: self.may_submit}
+        granted = {
+            Scope.READ: self.may_read,
+            Scope.SUBMIT: self.may_submit,
+            Scope.PUBLISH: self.may_publish,
+        }
         return tuple(scope.value for scope, is_granted in granted.items() if is_granted)

@@ -20,7 +20,8 @@ from leaderboard.people import accounts
 DAYS = 90
 MAX_DAYS = 365
 MAX_ACTIVE = 50
-ALL_SCOPES = (Scope.READ, Scope.SUBMIT)
+# Not publish: it cannot be undone, and few programs need it.
+USUAL_SCOPES = (Scope.READ, Scope.SUBMIT)
 # What `create` makes; anything else is refused before the database is asked.
 PATTERN = re.compile(r"tsttc_[0-9a-f]{64}")
 USED_EVERY = timedelta(minutes=1)
@@ -39,7 +40,7 @@ def create(
     user: User,
     name: str,
     now: datetime,
-    scopes: Collection[str] = ALL_SCOPES,
+    scopes: Collection[str] = USUAL_SCOPES,
     split_name: str = "",
     days: int = DAYS,
     actor: User | None = None,
@@ -63,6 +64,7 @@ def create(
             expiry=now + timedelta(days=days),
             may_read=Scope.READ in scopes,
             may_submit=Scope.SUBMIT in scopes,
+            may_publish=Scope.PUBLISH in scopes,
             split=split,
         )
         row.save(force_insert=True)
@@ -81,7 +83,9 @@ def _check(*, scopes: Collection[str], days: int) -> None:
     unknown = [scope for scope in scopes if scope not in Scope.values]
     if unknown or not scopes:
         given = f"the scope {unknown[0][:40]!r}" if unknown else "no scope"
-        raise Refused("bad-scope", f"The token has {given}; expected read, submit, or both.", field="scopes")
+        raise Refused(
+            "bad-scope", f"The token has {given}; expected read, submit or publish.", field="scopes"
+        )
     if not 1 <= days <= MAX_DAYS:
         raise Refused(
             "bad-days",

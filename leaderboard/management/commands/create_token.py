@@ -25,7 +25,7 @@ class Command(RefusingCommand):
             "--scope",
             action="append",
             choices=Scope.values,
-            help="scope of the token; may be given twice (default: both)",
+            help="scope of the token; may be given several times (default: read and submit)",
         )
         parser.add_argument("--split", default="", help="restrict the token to this split (default: all)")
         parser.add_argument(
@@ -45,7 +45,7 @@ class Command(RefusingCommand):
             secret = tokens.create(
                 user=self._account(email),
                 name=options["name"],
-                scopes=options["scope"] or tokens.ALL_SCOPES,
+                scopes=options["scope"] or tokens.USUAL_SCOPES,
                 split_name=options["split"],
                 days=options["days"],
                 now=timezone.now(),

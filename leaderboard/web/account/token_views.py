@@ -32,10 +32,11 @@ class TokenForm(SiteForm):
         widget=forms.CheckboxSelectMultiple,
         choices=[
             (Scope.READ, "read: see submissions and results"),
-            (Scope.SUBMIT, "submit: send and withdraw files, edit and publish methods"),
+            (Scope.SUBMIT, "submit: send and withdraw files, edit methods"),
+            (Scope.PUBLISH, "publish: publish methods, which cannot be undone"),
         ],
-        initial=list(Scope.values),
-        error_messages={"required": "The token has no scope; expected read, submit, or both."},
+        initial=list(tokens.USUAL_SCOPES),
+        error_messages={"required": "The token has no scope; expected read, submit or publish."},
     )
     split = forms.ChoiceField(label="Split", required=False, choices=_splits)
     days = forms.IntegerField(

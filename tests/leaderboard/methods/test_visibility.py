@@ -287,8 +287,9 @@ def test_program_shows_a_method_when_it_says_that_it_means_it(
     status, answer = ask(client, method, token, {"visibility": "PUBLIC"})
     assert (status, answer["code"], answer["problems"][0]["where"]) == (422, "not-confirmed", "confirm")
     assert ask(client, method, builders.token(stranger), {"visibility": "PUBLIC", "confirm": True})[0] == 404
-    reading = builders.token(owner, scopes=["read"])
-    assert ask(client, method, reading, {"visibility": "PUBLIC", "confirm": True})[0] == 403
+    submitting = builders.token(owner, scopes=["read", "submit"])
+    status, answer = ask(client, method, submitting, {"visibility": "PUBLIC", "confirm": True})
+    assert (status, answer["code"]) == (403, "token-scope")
     of_one_split = builders.token(owner, split_name="test")
     assert ask(client, method, of_one_split, {"visibility": "PUBLIC", "confirm": True})[0] == 403
     later = (timezone.now() + timedelta(days=9)).isoformat()

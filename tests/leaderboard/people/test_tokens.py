@@ -1,11 +1,13 @@
 """API tokens: what they are good for, and when they are good for nothing any more."""
 
 from datetime import UTC, datetime, timedelta
+from importlib import import_module
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pytest
+from django.apps import apps
 from django.core.files.base import ContentFile
 from django.utils import timezone
 from rest_framework.test import APIClient
@@ -36,7 +38,7 @@ def secret(owner: User) -> str:
 
 # --- the table -------------------------------------------------------------------------------------------
 
-SCOPES = [("read",), ("submit",), ("read", "submit")]
+SCOPES = [("read",), ("submit",), ("publish",), ("read", "submit"), ("read", "submit", "publish")]
 TABLE = list(product(SCOPES, ["standing", "expired"], ["standing", "revoked"], ["", "test", "val"]))
 
 
@@ -53,7 +55,7 @@ def test_a_token_opens_what_it_was_made_for_and_nothing_else(
         tokens.revoke(token=row, now=timezone.now(), actor=owner)
     is_dead = expiry == "expired" or revocation == "revoked"
     is_elsewhere = split == "val"
-    may_read, may_submit = "read" in scopes, "submit" in scopes
+    may_read, may_submit, may_publish = (scope in scopes for scope in ("read", "submit", "publish"))
 
     def wanted(*, may: bool, answer: int) -> int:
         return 401 if is_dead else answer if may else 403
@@ -66,6 +68,7 @@ def test_a_token_opens_what_it_was_made_for_and_nothing_else(
         "quota": client.get("/api/v1/quota").status_code,
         "withdraw": client.post(f"{submission}/withdraw").status_code,
         "submit": post(client, builders.predictions(edition, factor=1.3)).status_code,
+        "publish": client.post(f"/api/v1/methods/{sent.method_id}/visibility").status_code,
     }
     assert statuses == {
         "board": wanted(may=may_read and not is_elsewhere, answer=200),
@@ -74,6 +77,7 @@ def test_a_token_opens_what_it_was_made_for_and_nothing_else(
         "quota": wanted(may=True, answer=200),
         "withdraw": wanted(may=may_submit, answer=404 if is_elsewhere else 200),
         "submit": wanted(may=may_submit and not is_elsewhere, answer=201),
+        "publish": wanted(may=may_publish and not split, answer=422),  # it does not say `confirm`
     }
     assert Submission.objects.count() == 1 + (statuses["submit"] == 201)
 
@@ -97,7 +101,12 @@ def refusal(client: APIClient, address: str = "/api/v1/submissions") -> tuple[in
             "expired on 2026-01-02 03:04 UTC; create another",
         ),
         ({"revoked_at": ENDED_AT}, 401, "token-revoked", "revoked on 2026-01-02 03:04 UTC"),
-        ({"may_read": False}, 403, "token-scope", "has the scope 'submit'; expected 'read' for this."),
+        (
+            {"may_read": False},
+            403,
+            "token-scope",
+            "has the scope 'submit publish'; expected 'read' for this.",
+        ),
     ],
 )
 def test_a_token_that_does_not_open_says_why(
@@ -168,8 +177,22 @@ def test_making_and_revoking_are_audited_without_the_secret(owner: User, secret:
     assert (revoked.verb, created.verb, revoked.actor) == ("revoked", "created", owner)
     name = created.details.pop("name")
     assert audit.names_in([revoked, AuditEvent(details={"name": name})])[name] == "CI"
-    assert created.details == {"scopes": ["read", "submit"], "split": None, "days": 90}
+    assert created.details == {"scopes": ["read", "submit", "publish"], "split": None, "days": 90}
     assert secret not in str(created.details) + created.noun_id
+
+
+def test_a_token_made_without_scopes_cannot_publish(owner: User) -> None:
+    tokens.create(user=owner, name="CI", now=timezone.now())
+    assert ApiToken.objects.get().scopes == ("read", "submit")
+
+
+def test_a_token_from_before_the_scope_can_still_publish_if_it_could(owner: User) -> None:
+    for scope in ("read", "submit"):
+        builders.token(owner, scopes=[scope])
+    migration = import_module("leaderboard.migrations.0003_token_may_publish")
+    migration.keep_what_tokens_could(apps, None)
+    rows = ApiToken.objects.order_by("created")
+    assert [row.scopes for row in rows] == [("read",), ("submit", "publish")]
 
 
 # --- a leaked one ----------------------------------------------------------------------------------------
