@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable
+from itertools import groupby
 from typing import Final
 
 _COMMANDS: Final = {
@@ -48,8 +49,6 @@ _COMMANDS: Final = {
     "≤": r"$\leq$",
     "≥": r"$\geq$",
     "°": r"$^{\circ}$",
-    "²": "$^{2}$",
-    "³": "$^{3}$",
     "∞": r"$\infty$",
     "†": r"\dag{}",
     "‡": r"\ddag{}",
@@ -69,6 +68,7 @@ _ACCENTS: Final = {
     "\u030c": "v",
     "\u0327": "c",
 }
+_SUPERSCRIPTS: Final = dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-", strict=True))
 _CAPITALS: Final = "ΓΔΘΛΞΠΣΦΨΩ"  # the others look like Latin letters, and have no command
 _GREEK: Final = {
     letter: rf"$\{name.title() if letter in _CAPITALS else name}$"
@@ -103,8 +103,16 @@ def latex(text: str) -> str:
 
     >>> print(latex("50 % of x_1 & Müller–Łoś β 中"))
     50 \% of x\_1 \& M\"{u}ller\textendash{}\L{}o\'{s} $\beta$ [U+4E2D]
+    >>> print(latex("12.5 ×10⁻⁴"))
+    12.5 $\times$10$^{-4}$
     """
-    printed = "".join(map(_latex_character, unicodedata.normalize("NFC", one_line(text))))
+    line = unicodedata.normalize("NFC", one_line(text))
+    printed = "".join(
+        f"$^{{{''.join(map(_SUPERSCRIPTS.__getitem__, characters))}}}$"
+        if is_superscript
+        else "".join(map(_latex_character, characters))
+        for is_superscript, characters in groupby(line, key=_SUPERSCRIPTS.__contains__)
+    )
     # Two of these would be printed as one longer mark.
     return re.sub(r"-(?=-)|'(?=')", r"\g<0>{}", printed)
 

@@ -3,6 +3,7 @@
 from django import template
 
 from evaluator.counting import file_size
+from evaluator.tables import escaping
 from leaderboard.web import formatting
 
 register = template.Library()
@@ -14,6 +15,7 @@ register.filter("duration", formatting.duration)
 register.filter("ticked", formatting.ticked)
 register.filter("paragraphs", formatting.paragraphs)
 register.filter("breakable", formatting.breakable)
+register.filter("latex", escaping.latex)
 register.filter("unbroken", formatting.unbroken, is_safe=True)
 register.filter("lined", formatting.lined)
 register.simple_tag(formatting.day)

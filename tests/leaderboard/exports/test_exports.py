@@ -14,7 +14,7 @@ from django.test import Client
 from django.utils import timezone
 from markdown_it import MarkdownIt
 
-from evaluator.tables.escaping import markdown, one_line
+from evaluator.tables.escaping import latex, markdown, one_line
 from leaderboard.models import Edition, Method, User
 from leaderboard.submissions import intake
 from tests import board_rows, builders, pages
@@ -233,13 +233,26 @@ def test_a_methods_page_has_its_row_of_the_latex_table(edition: Edition, owner: 
     assert row in text_of(client, "tex").splitlines()
 
 
+def test_the_sentence_to_quote_stands_on_a_methods_page_in_latex(
+    edition: Edition, owner: User, client: Client
+) -> None:
+    method, *_ = board_rows.fill(edition, n=1, user=owner)
+    page = pages.get(client, f"/methods/{method.pk}/")
+    sentence = page.one("code", id="citation-test").text
+    in_latex = page.one("code", id="citation-latex-test").raw_text
+    assert in_latex == latex(sentence)
+    assert in_latex.isascii()
+    assert r"$\times$10$^{-4}$" in in_latex
+    assert "[U+" not in in_latex
+
+
 def test_a_team_finds_nothing_to_paste_that_names_its_anonymous_method(
     edition: Edition, owner: User, signed_in: Client
 ) -> None:
     sent = builders.submit(owner, builders.predictions(edition), method="Secret Net", visibility="ANONYMOUS")
     builders.score_all()
     page = pages.get(signed_in, f"/methods/{sent.method.pk}/")
-    for pasted in ("bibtex", "latex-row"):
+    for pasted in ("bibtex", "latex-row", "citation-test", "citation-latex-test"):
         text = page.one("code", id=pasted).raw_text
         assert sent.method.pseudonym in text
         assert "secret" not in text.lower()

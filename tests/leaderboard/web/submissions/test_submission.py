@@ -218,4 +218,4 @@ def test_after_the_score_the_next_steps_are_buttons(signed_in: Client, edition: 
     assert [a.text for a in main.one("p", class_="next").all("a")] == ["Publish…", "Signed receipt"]
     assert main.one("code", id="latex-row").text
     copied = {button.attributes["data-copy"] for button in main.all("button", class_="copy")}
-    assert copied == {"citation", "latex-row", "digest"}
+    assert copied == {"citation", "citation-latex", "latex-row", "digest"}
