@@ -44,13 +44,34 @@ def test_every_command_has_one_row_in_the_maintainers_guide_and_one_in_the_list(
     assert own - set(rows) == {"build_wheel", "demo"}  # of the installation, and of `make demo`
 
 
+@pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="only root has other accounts")
+def test_maintainers_command_runs_as_the_account_with_the_settings_of_the_site(tmp_path: Path) -> None:
+    script = (REPOSITORY / "deploy/tsttc-maintain").read_text("utf-8")
+    (tmp_path / "tsttc.env").write_text("TSTTC_SITE_URL=https://board.example.org\n")
+    (tmp_path / "tsttc-web.env").write_text("TSTTC_FROM_EMAIL='Board <b@example.org>'\n")
+    program = "import os; print(os.getuid(), os.umask(0), *map(os.getenv, __import__('sys').argv[1:]), sep='|')"
+    (tmp_path / "manage.py").write_text(program)
+    replaced = {
+        "/etc/": f"{tmp_path}/",
+        "/srv/tsttc/": f"{tmp_path}/",
+        "/opt/tsttc/bin/python": sys.executable,
+        "--reuid tsttc --regid tsttc": "--reuid root --regid root",
+    }
+    for original, test_value in replaced.items():
+        assert original in script
+        script = script.replace(original, test_value)
+    names = ["TSTTC_PROCESS", "TSTTC_SITE_URL", "TSTTC_FROM_EMAIL"]
+    done = subprocess.run(["/bin/sh", "-c", script, "sh", *names], capture_output=True, text=True, check=True)
+    assert done.stdout == f"0|{0o007}|maintainer|https://board.example.org|Board <b@example.org>\n"
+
+
 def test_every_command_that_a_document_or_a_page_names_is_there() -> None:
     sources = [*REPOSITORY.glob("docs/**/*.md"), *REPOSITORY.glob("templates/**/*.html")]
     sources += (REPOSITORY / "leaderboard").rglob("*.py")
     missing = [
         f"{source.relative_to(REPOSITORY)}: {name}"
         for source in sources
-        for name in re.findall(r"manage\.py (\w+)", source.read_text("utf-8"))
+        for name in re.findall(r"(?:manage\.py|tsttc-maintain) (\w+)", source.read_text("utf-8"))
         if name not in get_commands() and name != "COMMAND"
     ]
     assert missing == []
