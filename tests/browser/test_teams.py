@@ -33,3 +33,13 @@ def test_link_lets_a_second_person_in(new_page: NewPage) -> None:
     guest.wait_for_url("**/team/")
     expect(guest.get_by_role("heading", level=1)).to_have_text("Two of them")
     expect(guest.get_by_role("cell", name="first-of-two@example.org")).to_be_visible()
+    owner.reload()
+    handing_over = owner.get_by_role("group").filter(has_text="Make owner")
+    handing_over.locator("summary").click()
+    make_owner = owner.get_by_role("button", name="Make second-of-two@example.org the owner")
+    make_owner.click()  # without a tick: the browser asks for it, and sends nothing
+    guest.reload()
+    expect(guest.get_by_text("Make owner")).to_have_count(0)
+    handing_over.get_by_role("checkbox").check()
+    make_owner.click()
+    expect(owner.get_by_text("second-of-two@example.org owns the team now.")).to_be_visible()

@@ -49,7 +49,9 @@ def test_maintainers_command_runs_as_the_account_with_the_settings_of_the_site(t
     script = (REPOSITORY / "deploy/tsttc-maintain").read_text("utf-8")
     (tmp_path / "tsttc.env").write_text("TSTTC_SITE_URL=https://board.example.org\n")
     (tmp_path / "tsttc-web.env").write_text("TSTTC_FROM_EMAIL='Board <b@example.org>'\n")
-    program = "import os; print(os.getuid(), os.umask(0), *map(os.getenv, __import__('sys').argv[1:]), sep='|')"
+    program = (
+        "import os; print(os.getuid(), os.umask(0), *map(os.getenv, __import__('sys').argv[1:]), sep='|')"
+    )
     (tmp_path / "manage.py").write_text(program)
     replaced = {
         "/etc/": f"{tmp_path}/",

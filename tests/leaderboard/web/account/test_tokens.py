@@ -81,6 +81,7 @@ def test_what_is_wrong_stands_at_its_field(
 def test_revoking_ends_a_token_at_once(signed_in: Client, owner: User) -> None:
     secret = builders.token(owner)
     form = pages.page(signed_in.get(PAGE)).one("form", action="/tokens/revoke/")
+    assert "required" in form.one("input", type="checkbox").attributes  # a slip of the mouse revokes nothing
     data = {"token": form.one("input", name="token").attributes["value"]}
     assert signed_in.post("/tokens/revoke/", data).headers["Location"] == PAGE
     response = APIClient().get("/api/v1/submissions", HTTP_AUTHORIZATION=f"Bearer {secret}")
