@@ -39,8 +39,9 @@
     number: () => (value) => String(value).replace("-", "−"),
     texts: (places) => (value) => places.find(([place]) => Math.abs(place - value) < 1e-6)?.[1] ?? "",
     // A name begins below its mark. It moves to the left where it would cross the next step or leave the drawing; where
-    // it would then read as the next mark's it ends below its own. It goes where there is no room for it,
-    // or where it would lie below the mark before, too.
+    // it would then read as the next mark's it ends below its own. It goes where there is no room for it, where the next
+    // mark is so near that the name would read as its, or where it would lie below the mark before, too. The last
+    // mark, the best, keeps its name.
     below:
       (places, chart) =>
       ({ dataIndex, rect, labelRect: { width, height } }) => {
@@ -48,10 +49,11 @@
         const pixels = (place) => place && chart.convertToPixel({ xAxisIndex: 0, yAxisIndex: 0 }, place);
         const [before, next] = places[dataIndex].map(pixels);
         let end = next ? next[0] - 6 : chart.getWidth() - 18;
-        if (left + width > end && (!next || Math.abs(next[1] - bottom - height) < height)) end = own;
+        if (next && left + width > end && Math.abs(next[1] - bottom - height) < height) end = own;
         const dx = Math.min(0, end - left - width);
-        const isBelowBoth = before && left + dx <= before[0] && bottom - before[1] < 2 * height;
-        return left + dx < 40 || isBelowBoth ? { x: -1000 } : { hideOverlap: true, dx };
+        const isBelowBoth = next && before && left + dx <= before[0] && bottom - before[1] < 2 * height;
+        const isNearNext = next && next[0] - left < 16 && next[1] - bottom < 2 * height;
+        return left + dx < 40 || isBelowBoth || isNearNext ? { x: -1000 } : { hideOverlap: true, dx };
       },
     whisker: (ink) => (_, api) => {
       const [x, low] = api.coord([api.value(0), api.value(1)]);

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Final
 
-from evaluator.metrics.protocol import column_words, metric_of
+from evaluator.metrics.protocol import column_words, metric_of, split_name
 from evaluator.scoring.significance import LEAST_P, SIGNIFICANT, Difference, best_of, too_few_units
 from evaluator.units import in_words
 
+_MAX_NAMED: Final = 3
 _DECIMALS_IN_WORDS: Final = {1: "one decimal", 2: "two decimals"}
 
 
@@ -173,20 +174,27 @@ def resolutions(pairs: Sequence[Mapping[str, Difference]]) -> dict[str, float]:
 
 
 def others(differences: Mapping[str, Difference], *, primary: str) -> str:
-    """Count the columns besides `primary` that differ significantly; empty if no column has a p.
+    """Count the columns besides `primary` that differ significantly, and name up to three of them.
+
+    Empty if no column has a p.
 
     >>> alike, far = Difference(0.1, -0.2, 0.4, 0.5), Difference(-4.1, -5.3, -2.9, 0.0003)
     >>> others({"mid": far, "mid_small": alike, "rte": alike}, primary="mid")
     'None of the 2 other metrics differs significantly (p < 0.05, uncorrected).'
     >>> others({"mid": alike, "mid_small": far, "rte": alike}, primary="mid")
-    '1 of the 2 other metrics differs significantly (p < 0.05, uncorrected).'
+    '1 of the 2 other metrics differs significantly (p < 0.05, uncorrected): MiD small.'
     """
     tested = [name for name, gap in differences.items() if name != primary and gap.p_below is not None]
     if not tested:
         return ""
-    n_different = sum(differences[name].is_significant for name in tested)
-    differ = "differs" if n_different <= 1 else "differ"
+    different = [
+        f"{metric_of(name).symbol} {split_name(name)[1]}"
+        for name in tested
+        if differences[name].is_significant
+    ]
+    differ = "differs" if len(different) <= 1 else "differ"
+    named = f": {', '.join(different)}" if 0 < len(different) <= _MAX_NAMED else ""
     return (
-        f"{n_different or 'None'} of the {len(tested)} other metrics {differ} significantly "
-        f"(p < {SIGNIFICANT:g}, uncorrected)."
+        f"{len(different) or 'None'} of the {len(tested)} other metrics {differ} significantly "
+        f"(p < {SIGNIFICANT:g}, uncorrected){named}."
     )

@@ -91,11 +91,11 @@ def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
         series=[_series(name, [cell for cell in pair_cells if cell.verdict == name]) for name in verdicts],
         series_by_width=(
             [{"label": {"show": True}} for _ in verdicts],
-            [{"label": {"show": len(entries) <= _FEW_ON_A_PHONE}} for _ in verdicts],
+            [{"label": {"show": len(entries) <= _FEW_ON_A_PHONE, "fontSize": 9}} for _ in verdicts],
         ),
         names=verdicts,
         # On a phone names have two lines: cut to their beginnings they would be alike.
-        left=(220, 136),
+        left=(220, 126),
         y_labels_by_width=(
             TEXT | {"overflow": "truncate"},
             {"overflow": "break", "fontSize": 10, "lineHeight": 11},
