@@ -87,7 +87,10 @@ def reference_curves(*, split: Split, besides: Method) -> list[tuple[str, Entry,
 
 
 def missing(*, readable_truths: Collection[str]) -> QuerySet[Evaluation]:
-    """Return board entries of open splits without an analysis, newest first."""
+    """Return board entries of open splits without an analysis.
+
+    They are in random order: those whose file cannot be read at present keep no other waiting.
+    """
     opened = [digest for digest in readable_truths if not hidden_marks.is_marked(digest)]
     boards = Split.objects.filter(is_hidden=False, current_edition__ground_truth__in=opened)
     return (
@@ -98,7 +101,7 @@ def missing(*, readable_truths: Collection[str]) -> QuerySet[Evaluation]:
             submission__withdrawn_at=None,
         )
         .select_related("edition__ground_truth", "edition__split", "submission")
-        .order_by("-finished_at")
+        .order_by("?")
     )
 
 

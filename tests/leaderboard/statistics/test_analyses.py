@@ -12,6 +12,7 @@ from evaluator.metrics.registry import WARNING_S
 from leaderboard.models import Analysis, Edition, Split, Submission, User
 from leaderboard.statistics import analyses
 from leaderboard.storage import files, truth_values
+from leaderboard.upkeep import backlog
 from leaderboard.web.charts import analysis_charts
 from tests import builders
 from tests.editions import ANYBODY
@@ -154,6 +155,22 @@ def test_hidden_values_are_looked_at_by_no_worker_whatever_the_database_calls_th
     builders.infer_all()
     analyses.make(submission.evaluations.get(), now=timezone.now())
     assert not Analysis.objects.exists()
+
+
+def test_a_file_that_cannot_be_read_keeps_no_other_analysis_waiting(
+    val: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    readable = builders.submit(owner, builders.predictions(val), split="val")
+    lost = builders.submit(owner, builders.predictions(val, factor=1.2), split="val", method="Lost")
+    builders.score_all()
+    file = lost.sent_file
+    aligned = files.aligned_name(manifest_digest=file.manifest_digest, digest=file.digest)
+    for name in (files.predictions_name(lost.digest), aligned):
+        files.store().delete(name)
+    monkeypatch.setattr(backlog, "MAX_AT_ONCE", 1)
+    for _ in range(40):  # each time one of the two is tried
+        builders.infer_all()
+    assert [row.evaluation.submission for row in Analysis.objects.all()] == [readable]
 
 
 def test_many_sequences_give_a_bounded_number_of_points(val: Edition) -> None:
