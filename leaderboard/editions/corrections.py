@@ -125,7 +125,7 @@ def queue_active(edition: Edition) -> int:
 
 
 def progress(edition: Edition) -> RescoringProgress:
-    """Count the decided evaluations, with a rate since the first start."""
+    """Count the decided evaluations; of a draft that is re-scored, with a rate since the first start."""
     rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None)
 
     def of(*statuses: Status) -> Count:
@@ -141,7 +141,8 @@ def progress(edition: Edition) -> RescoringProgress:
     )
     first = counts.pop("first")
     so_far = RescoringProgress(**counts, rate_per_s=None, left_s=None)
-    if first is None or not so_far.n_done or not so_far.n_waiting:
+    # The files of a board come over weeks: their rate says nothing.
+    if not edition.is_in_preparation or first is None or not so_far.n_done or not so_far.n_waiting:
         return so_far
     rate_per_s = so_far.n_done / max((clock.database_now() - first).total_seconds(), 0.001)
     return replace(so_far, rate_per_s=rate_per_s, left_s=so_far.n_waiting / rate_per_s)

@@ -15,6 +15,7 @@ from django_htmx.http import HttpResponseClientRefresh
 
 from evaluator.tables.formats import csv_lines
 from leaderboard.editions import corrections, history, preview, splits
+from leaderboard.editions.preview import ABSENT
 from leaderboard.errors.refusals import NotMaintainer
 from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, Team, User
 from leaderboard.pages import texts
@@ -152,9 +153,12 @@ def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
             )
             messages.success(request, f"Edition {number} is now the {row.split.title} board.")
             return redirect("board", split)
-    return form_page(
-        request, "maintain/publish.html", form, unfinished=corrections.unfinished(row), **context
-    )
+    states = dict(row.evaluations.values_list("submission", "status"))
+    unfinished = [
+        (submission, preview_tables.STATUS_LABELS[states.get(submission.pk, ABSENT)])
+        for submission in corrections.unfinished(row)
+    ]
+    return form_page(request, "maintain/publish.html", form, unfinished=unfinished, **context)
 
 
 @maintainers_form

@@ -1,7 +1,7 @@
 """What publishing an edition does to the board: in sentences, and entry by entry."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from django.utils.text import get_text_list
@@ -17,7 +17,7 @@ from leaderboard.web.boards import edition_tables
 from leaderboard.web.boards.score_columns import column_css, score_heading
 
 _ENDED_BADLY: Final = (Status.REJECTED, Status.SYSTEM_ERROR, Status.CANCELLED)
-_STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}
+STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}
 
 
 def change_table(preview: Preview) -> dict[str, Any]:
@@ -45,10 +45,11 @@ def effects(preview: Preview) -> tuple[str, ...]:
         unchanged = []
     elif not n_moved:
         unchanged.append("all other ranks" if preview.n_moved else "all ranks")
+    before = [entry.old_status for entry in preview.entries]
     truth = _truth_effect(preview)
     unchanged += ["the ground truth"] * (not truth)
     scores = (
-        f"{get_text_list(symbols, 'and')} change{'s' * (len(symbols) == 1)} for {_share(n, preview)}."
+        f"{get_text_list(symbols, 'and')} change{'s' * (len(symbols) == 1)} for {_share(n, before)}."
         for n, symbols in by_count.items()
     )
     sentences = (
@@ -56,7 +57,7 @@ def effects(preview: Preview) -> tuple[str, ...]:
         *_rule_effects(preview),
         *_state_effects(preview),
         *scores,
-        f"{_share(n_moved, preview)} get{'s' * (n_moved == 1)} another rank." if n_moved else "",
+        f"{_share(n_moved, before)} get{'s' * (n_moved == 1)} another rank." if n_moved else "",
         f"{get_text_list(unchanged, 'and')} stay{'s' * (len(unchanged) == 1)} the same." if unchanged else "",
     )
     return tuple(sentence[0].upper() + sentence[1:] for sentence in sentences if sentence)
@@ -91,12 +92,14 @@ def _protocol_effects(preview: Preview) -> Iterator[str]:
     for metric in old.metrics:
         if metric not in new.metrics:
             n = sum(_has(e.old, metric) and e.new_status == Status.SCORED for e in entries)
-            loss = f": {_share(n, preview)} lose{'s' * (n == 1)} this score" if n else ""
+            share = _share(n, (e.old_status for e in entries))
+            loss = f": {share} lose{'s' * (n == 1)} this score" if n else ""
             yield f"The new one does not compute the {_title(metric)}{loss}."
     for metric in new.metrics:
         if metric not in old.metrics:
             n = sum(_has(e.new, metric) for e in entries)
-            gain = f": {_share(n, preview)} get{'s' * (n == 1)} this score" if n else ""
+            share = _share(n, (e.new_status for e in entries))
+            gain = f": {share} get{'s' * (n == 1)} this score" if n else ""
             yield f"The new one adds the {_title(metric)}{gain}."
     for one, other, verb in ((old, new, "has no"), (new, old, "adds the")):
         gone = (each for each in one.ranges if each not in other.ranges)
@@ -114,12 +117,13 @@ def _state_effects(preview: Preview) -> Iterator[str]:
         yield f"{counted(n, 'more submission')} {'is' if n == 1 else 'are'} scored."
 
 
-def _share(n: int, preview: Preview) -> str:
-    n_entries = len(preview.entries)
-    entries = counted(n_entries, "scored submission")
-    if n < n_entries:
-        return f"{n:,} of {entries}"
-    return entries if n == 1 else f"all {entries}"
+def _share(n: int, statuses: Iterable[str]) -> str:
+    """Word how many of the scored submissions these are; `statuses` are those of all entries."""
+    n_scored = sum(status == Status.SCORED for status in statuses)
+    scored = counted(n_scored, "scored submission")
+    if n < n_scored:
+        return f"{n:,} of {scored}"
+    return scored if n == 1 else f"all {scored}"
 
 
 def _title(metric: Metric) -> str:
@@ -148,7 +152,7 @@ def _shown_names(preview: Preview) -> tuple[str, ...]:
 
 
 def _change_row(change: Change, names: Sequence[str], preview: Preview) -> dict[str, Any]:
-    old_status, new_status = (_STATUS_LABELS[s] for s in (change.old_status, change.new_status))
+    old_status, new_status = (STATUS_LABELS[s] for s in (change.old_status, change.new_status))
     is_news = change.problems and change.old_status != change.new_status
     reason = change.problems[0]["message"] if is_news else ""
     return {

@@ -72,7 +72,7 @@ def _by_paper() -> dict[str, Any]:
     metrics = [each for name, each in known_metrics().items() if any(name in row.scores for row in rows)]
     papers: dict[tuple[str, ...], list[tuple[PublishedResult, list[tuple[Metric, str]]]]] = {}
     for row in rows:
-        paper = (row.split_id, row.source_url, row.source_title, row.source_table)
+        paper = (row.split_id, row.source_url, row.source_title, row.source_table, str(row.year))
         papers.setdefault(paper, []).append(
             (row, [(each, _words(row.scores.get(each.name))) for each in metrics])
         )

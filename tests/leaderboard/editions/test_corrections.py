@@ -81,6 +81,18 @@ def test_new_uploads_meanwhile_are_scored_in_both(
     assert corrections.unfinished(second) == []
 
 
+def test_only_a_draft_has_a_rate_and_a_time_that_is_left(
+    entries: list[Submission], owner: User, edition: Edition, tmp_path: Path
+) -> None:
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    builders.score_all()
+    builders.submit(owner, builders.predictions(edition, factor=1.01), method="New")
+    board, draft = corrections.progress(edition), corrections.progress(second)
+    assert (board.n_waiting, draft.n_waiting) == (1, 1)
+    assert (board.rate_per_s, board.left_s) == (None, None), "its files came over weeks"
+    assert None not in (draft.rate_per_s, draft.left_s)
+
+
 def test_publishing_flips_the_board_and_rolling_back_returns_it_as_it_was(
     entries: list[Submission], tmp_path: Path, client
 ) -> None:

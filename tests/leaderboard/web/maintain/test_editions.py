@@ -218,6 +218,21 @@ def test_a_protocol_that_lacks_a_metric_says_who_loses_it(
     assert gain in effects(back)[0]
 
 
+def test_a_submission_that_waits_is_counted_in_no_score_and_listed_with_its_state(
+    keeper: Client, owner: User, open_values: None, tmp_path: Path
+) -> None:
+    first = builders.import_truth(tmp_path, protocol="tsttc-2")
+    builders.submit(owner, builders.predictions(first), method="Done")
+    builders.score_all()
+    open_edition(protocol="toolkit")
+    builders.score_all()
+    builders.submit(owner, builders.predictions(first, factor=1.05), method="Late")
+    root = get(keeper, f"{SECOND}publish/")
+    assert "(WE): 1 scored submission loses this score." in effects(root)[0]
+    [late] = root.one("ul", class_="left-out").all("li")
+    assert re.fullmatch(r"Late Owls, submitted [0-9-]{10}: queued", late.text)
+
+
 def test_csv_has_every_number_and_guards_texts(keeper: Client, rescored: Edition) -> None:
     Method.objects.filter(name="M1.05").update(name='=HYPERLINK("https://example.org")')
     Team.objects.update(name="@team")
