@@ -91,7 +91,8 @@ class Program:
     """A CI job: speaks to the API with a token, or as a signed-in visitor's session."""
 
     def __init__(self, site: Site, *, email: str) -> None:
-        token = site.manage("create_token", email, "--name", "journey").strip()
+        scopes = (f"--scope={scope}" for scope in ("read", "submit", "publish"))
+        token = site.manage("create_token", email, "--name", "journey", *scopes).strip()
         self.http = httpx.Client(
             base_url=site.url,
             headers={"Authorization": f"Bearer {token}"},

@@ -54,7 +54,8 @@ def tokens(site: Site) -> Iterator[str]:
     program = (
         "from django.core.management import call_command\n"
         f"for i in range({N_JOBS}):\n"
-        "    call_command('create_token', f'job-{i}@example.org', name='CI')\n"
+        "    scopes = ['read', 'submit', 'publish']\n"
+        "    call_command('create_token', f'job-{i}@example.org', name='CI', scope=scopes)\n"
     )
     lines = site.manage("shell", "--no-imports", "--command", program).split()
     assert len(lines) == N_JOBS
@@ -99,7 +100,7 @@ def test_what_is_one_s_own_is_listed_taken_back_and_withdrawn(job: Job) -> None:
     tsttc = command(job.site.url, secret, home=job.home)
     assert tsttc("methods").stdout == "Your team has no methods yet; tsttc submit creates one.\n"
     assert job.submit(sent, "--wait", tsttc=tsttc).returncode == 0
-    assert 'token "CI": read and submit, until ' in tsttc("whoami").stdout
+    assert 'token "CI": read, submit, publish, until ' in tsttc("whoami").stdout
     (submission,) = json.loads(tsttc("submissions", "--split", "test", "--json").stdout)
     (method,) = json.loads(tsttc("methods", "--json").stdout)
     assert (submission["method_id"], method["visibility"]) == (method["id"], "PRIVATE")
