@@ -113,13 +113,13 @@ def strike_words(evaluation: Evaluation) -> str:
     """Count failed runs by cause; empty if none failed.
 
     >>> strike_words(Evaluation(n_poison_strikes=2))
-    'file 2 of 3'
+    '2 of 3 (file)'
     """
     strikes = (
         ("file", evaluation.n_poison_strikes, MAX_POISON_STRIKES),
         ("system", evaluation.n_infrastructure_strikes, MAX_INFRASTRUCTURE_STRIKES),
     )
-    return ", ".join(f"{kind} {n} of {most}" for kind, n, most in strikes if n)
+    return ", ".join(f"{n} of {most} ({kind})" for kind, n, most in strikes if n)
 
 
 def _faults(*, has_worker: bool) -> Iterable[str]:
