@@ -70,19 +70,18 @@ def axis(end: float, *, start: float | None = None) -> SafeString:
     """Draw the scale for the head of a column."""
     start = -end if start is None else start
     stops = [_x(at, end, start) for at in (start, 0.0, end)]
-    # Where both ends leave room for it.
-    zero = (
-        format_html('<text x="{}" y="9" text-anchor="middle">0</text>', stops[1]) if start < -end / 3 else ""
-    )
+    # 0 is what one looks for: the start has a label only where it leaves room.
+    first = format_html('<text x="0" y="9">{}</text>', tick_text(start)) if start < -end / 3 else ""
     ticks = format_html_join("", '<line x1="{0}" x2="{0}" y1="11" y2="14"/>', ((at,) for at in stops))
     return format_html(
         '<svg class="axis" aria-hidden="true"><line x1="{}" x2="{}" y1="14" y2="14"/>{}'
-        '<text x="0" y="9">{}</text>{}<text x="100%" y="9" text-anchor="end">{}</text></svg>',
+        '{}<text x="{}" y="9" text-anchor="middle">0</text>'
+        '<text x="100%" y="9" text-anchor="end">{}</text></svg>',
         stops[0],
         stops[2],
         ticks,
-        tick_text(start),
-        zero,
+        first,
+        stops[1],
         tick_text(end),
     )
 
