@@ -23,10 +23,12 @@ STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}
 def change_table(preview: Preview) -> dict[str, Any]:
     """Return the preview for the template."""
     primary, names = preview.edition.rules.primary.name, _shown_names(preview)
+    ranks = [entry.new_rank for entry in preview.entries if entry.new_rank is not None]
     return {
         "headings": [score_heading(name, primary=primary) for name in names],
         "rows": [_change_row(change, names, preview) for change in preview.entries],
         "has_states": any({e.old_status, e.new_status} != {Status.SCORED} for e in preview.entries),
+        "has_gaps": len(ranks) < max(ranks, default=0),
         "has_unranked": any(None in (e.old_rank, e.new_rank) for e in preview.entries),
         "n_rejected_in_both": len(preview.changes) - len(preview.entries),
         "effects": effects(preview),

@@ -15,6 +15,7 @@ from leaderboard.models import (
     Edition,
     Evaluation,
     Method,
+    PublishedResult,
     Status,
     Submission,
     Team,
@@ -231,6 +232,20 @@ def test_a_submission_that_waits_is_counted_in_no_score_and_listed_with_its_stat
     assert "(WE): 1 scored submission loses this score." in effects(root)[0]
     [late] = root.one("ul", class_="left-out").all("li")
     assert re.fullmatch(r"Late Owls, submitted [0-9-]{10}: queued", late.text)
+
+
+@pytest.mark.parametrize("has_quoted", [True, False])
+def test_ranks_of_quoted_rows_are_explained_where_they_are_missing(
+    keeper: Client, edition: Edition, owner: User, has_quoted: bool
+) -> None:
+    for factor in (1.05, 9.0):
+        builders.submit(owner, builders.predictions(edition, factor=factor), method=f"M{factor}")
+    if not has_quoted:
+        PublishedResult.objects.all().delete()
+    builders.score_all()
+    open_edition(protocol="toolkit")
+    builders.score_all()
+    assert ("The other ranks belong to rows quoted from papers" in main_text(keeper, SECOND)) == has_quoted
 
 
 def test_csv_has_every_number_and_guards_texts(keeper: Client, rescored: Edition) -> None:
