@@ -67,7 +67,11 @@ def difference(
 
 
 def axis(end: float, *, start: float | None = None) -> SafeString:
-    """Draw the scale for the head of a column."""
+    """Draw the scale for the head of a column.
+
+    >>> [axis(80.0, start=start).count("<text") for start in (-80.0, -0.15)]
+    [3, 2]
+    """
     start = -end if start is None else start
     stops = [_x(at, end, start) for at in (start, 0.0, end)]
     # 0 is what one looks for: the start has a label only where it leaves room.

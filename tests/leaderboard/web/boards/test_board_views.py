@@ -49,6 +49,7 @@ def test_values_have_intervals_ranks_have_ranges_and_what_is_with_the_best_is_ma
     legend = root.one("details", class_="legend").text
     assert re.search(r"the bar its 95% confidence interval \(bootstrap over [\d,]+ recordings\)", legend)
     assert "Rings are values quoted from papers. They have no confidence interval" in legend
+    assert "rows quoted from papers never have a range" in legend
     published = row_of(root, "Deep Scale")
     assert "papers do not report" in published.one("td", class_="interval").attributes["title"]
     assert published.one("td", class_="interval").text == "no confidence interval"
@@ -119,7 +120,11 @@ def test_filters_and_search_show_what_fits_and_keep_the_ranks(
         matches = pages.board_rows(root)
         assert len(matches) == len(expected), query
         assert all(everything[row[1]] == row[0] for row in matches)
-        assert f"{len(matches)} of {len(everything)} results" in root.one("main").text
+        text = root.one("main").text
+        assert f"{len(matches)} of {len(everything)} results" in text
+        assert f"Bold: best of all {len(everything)}, underlined" in text
+        assert "All methods with intervals, also those that the filter hides." in text
+    assert "filter hides" not in get(client).one("main").text
 
 
 def test_chips_say_what_is_filtered_and_the_panel_opens_for_a_fault_alone(
