@@ -129,9 +129,15 @@ def test_caption_of_the_progress_says_that_it_has_all_rows_whatever_the_filter(
     client: Client, entries: list[Submission]
 ) -> None:
     spread(entries)
-    section = get(client, "/board/test/?q=M1.05").one("section", class_="board-progress")
-    words = "All public submissions to Test, and rows quoted from papers."
-    assert section.one("p", class_="note").text.startswith(words)
+
+    def words(url: str) -> str:
+        section = get(client, url).one("section", class_="board-progress")
+        return section.one("p", class_="note").text
+
+    start = "All public submissions to Test"
+    assert words("/board/test/").startswith(f"{start}, and rows quoted from papers.")
+    filtered = words("/board/test/?q=M1.05")
+    assert filtered.startswith(f"{start}, also those that the filter hides, and rows quoted from papers.")
 
 
 def test_below_a_board_the_chart_does_not_change_with_its_filters(
