@@ -89,19 +89,20 @@ def _add_crops(figure: Figure, clip: Clip, estimator: PixelMse, match: Match, fr
     )
     remaining = cv2.absdiff(theirs.picture.pixels, matched.picture.pixels)
     strong = np.minimum(remaining.astype(np.uint16) * 3, 255).astype(np.uint8)
-    colours = figure.theme
+    # A photograph is as dark in both themes.
+    bright, colours = THEMES["dark"], figure.theme
     figure.shapes += [
         ours.picture,
-        outline(ours.to_figure(reference_box), colour=colours.accent),
-        outline(ours.to_figure(matched_box), colour=colours.mark),
+        outline(ours.to_figure(reference_box), colour=bright.accent),
+        outline(ours.to_figure(matched_box), colour=bright.mark),
         theirs.picture,
-        outline(theirs.to_figure(target_box), colour=colours.accent),
+        outline(theirs.to_figure(target_box), colour=bright.accent),
         matched.picture,
-        outline(matched.to_figure(matched_box), colour=colours.mark),
+        outline(matched.to_figure(matched_box), colour=bright.mark),
         Picture(strong, right, below, side, side),
         outline(
             [v if i % 2 == 0 else v + below - top for i, v in enumerate(theirs.to_figure(target_box))],
-            colour=colours.accent,
+            colour=bright.accent,
             width=1,
         ),
     ]

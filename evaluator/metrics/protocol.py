@@ -72,7 +72,7 @@ class TTCRange:
         '0 s ≤ τ ≤ 3 s'
         """
         low, high = "≤<"[self.is_low_open], "≤<"[self.is_high_open]
-        return f"{self.low_s:g} s {low} τ {high} {self.high_s:g} s"
+        return f"{self.low_s:g} s {low} τ {high} {self.high_s:g} s".replace("-", "−")
 
     @property
     def seconds(self) -> str:

@@ -33,6 +33,7 @@ class Terms:
 
     @classmethod
     def of(cls, predicted_ttc_s: ArrayLike, true_ttc_s: ArrayLike) -> Terms:
+        """Compute the scale ratios of times to contact in seconds, whose shapes broadcast."""
         import numpy as np  # noqa: PLC0415 -- as the docstring above says
 
         from evaluator.arrays import as_floats  # noqa: PLC0415 -- loads numpy

@@ -56,13 +56,13 @@ def unit_warnings(ttc_s: Floats) -> list[FileWarning]:
     n_ratios = int(np.count_nonzero((ttc_s >= RATIOS[0]) & (ttc_s <= RATIOS[1])))
     if n_far >= MIN_SHARE * n:
         message = (
-            f"{n_far:,} of {n:,} values lie beyond ±20 s; expected most of them within. Probably they are "
-            "milliseconds, or scale ratios of another frame gap than the file states."
+            f"{n_far:,} of {n:,} values lie beyond ±20 s; expected most of them within ±20 s. They are "
+            "probably milliseconds, or scale ratios of a frame gap that is not the one in the file."
         )
         return [FileWarning("not-seconds", message)]
     if n_ratios >= MIN_SHARE * n:
         message = (
-            f"{n_ratios:,} of {n:,} values lie between 0.5 and 1.5 s; expected few. Probably they are scale "
+            f"{n_ratios:,} of {n:,} values lie between 0.5 and 1.5 s; expected few. They are probably scale "
             'ratios: these need "unit": "scale_ratio" and fps or frame_gap beside them.'
         )
         return [FileWarning("looks-like-ratios", message)]

@@ -95,8 +95,8 @@ class CountsSerializer(NamedSerializer):
         return rules.range_names
 
     def child(self, name: str, **options: Any) -> serializers.IntegerField:
-        text = f"Number of sequences: {_sequences(known_ranges().get(name))}."
-        return serializers.IntegerField(help_text=text, **options)
+        counted = _sequences(known_ranges().get(name))
+        return serializers.IntegerField(help_text=f"{counted[0].upper()}{counted[1:]}.", **options)
 
 
 class ProblemSerializer(serializers.Serializer[Any]):

@@ -33,8 +33,8 @@ DATABASE_AWAY = Outage(
     status=503,
     code="database-unavailable",
     title="The leaderboard is not available",
-    sentence="The database does not answer at the moment. If you were submitting a file, submit it "
-    "again: the same file never counts twice.",
+    sentence="The database does not answer at the moment. Try again in a few minutes. If you were submitting "
+    "a file, submit it again then: the same file never counts twice.",
     retry_after_s=5,
 )
 STORE_AWAY = Outage(

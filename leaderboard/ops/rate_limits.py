@@ -42,7 +42,7 @@ def account_or_address(request: Any) -> str:
 
 def refusal(wait_s: float) -> str:
     """Return the message for a client that asked too often."""
-    return f"Too many requests in a short time; the next one is answered in {math.ceil(wait_s)} s."
+    return f"Too many requests in a short time; try again in {math.ceil(wait_s)} s."
 
 
 class Throttle(SimpleRateThrottle):

@@ -105,8 +105,8 @@ def why_withheld(first: Entry, second: Entry, *, edition: Edition) -> str:
     for entry in (first, second):
         if entry.visibility == Visibility.ANONYMOUS and not entry.is_mine:
             return (
-                f"Differences from {entry.method} have no interval or p-value until it is public, because "
-                "they could reveal its team."
+                f"Differences from {entry.method} have no interval or p-value until the method is public, "
+                "because they could reveal its team."
             )
     if not edition.split.is_hidden:
         return ""

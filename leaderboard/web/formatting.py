@@ -11,7 +11,8 @@ from evaluator import format_rounded
 from evaluator.counting import counted
 from leaderboard.boards.rows import ConfidenceInterval
 
-_BETWEEN_ENDS = re.compile(r"(?<=\d) to (?=[+−]?\d)")
+_UNITS = r"m?s|m|Hz|[KMG]i?B|TB|bits?|px|seconds?|minutes?|hours?|days?|weeks?|cores?"
+_TOGETHER = re.compile(rf"(?<=\d) to (?=[+−]?\d)|(?<=\d) (?=(?:{_UNITS})\b)|(?<= s) [≤<] τ [≤<] (?=−?\d)")
 
 
 def grouped(value: int | None) -> str:
@@ -120,13 +121,18 @@ def with_bold_names(sentence: str, names: Collection[str]) -> SafeString:
 
 
 def unbroken(text: str) -> str:
-    """Keep each interval of a text on one line.
+    """Keep each interval, each number with its unit and each TTC range on one line.
 
-    >>> unbroken("lower (2.9 to 5.3)").split(" ")
-    ['lower', '(2.9\\xa0to\\xa05.3)']
+    >>> unbroken("lower (2.9 to 5.3) with 0 s ≤ τ ≤ 3 s").split(" ")
+    ['lower', '(2.9\\xa0to\\xa05.3)', 'with', '0\\xa0s\\xa0≤\\xa0τ\\xa0≤\\xa03\\xa0s']
     """
-    # Most texts of a table have none.
-    return text if " to " not in text else _BETWEEN_ENDS.sub("\N{NO-BREAK SPACE}to\N{NO-BREAK SPACE}", text)
+    return _TOGETHER.sub(lambda gap: gap[0].replace(" ", "\N{NO-BREAK SPACE}"), text)
+
+
+def jointed(name: str) -> SafeString:
+    """Let a long name break after each underscore, as HTML."""
+    *parts, last = name.split("_")
+    return format_html("{}{}", format_html_join("", "{}_<wbr>", ((part,) for part in parts)), last)
 
 
 def breakable(path: str) -> SafeString:

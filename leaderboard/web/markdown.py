@@ -7,6 +7,7 @@ from functools import cache
 from itertools import pairwise
 from typing import Final
 
+from django.utils.html import conditional_escape
 from django.utils.safestring import SafeString
 from django.utils.text import slugify
 from markdown_it import MarkdownIt
@@ -28,6 +29,9 @@ _NAMES: Final = re.compile(r"(?<=<code>)[^<]+(?=</code>)|(?<=>)[^<]+(?=</h3>)")
 _LONG: Final = re.compile(r"\S{24,}")
 _JOINT: Final = re.compile(r"(?<=[\w}][/_])(?=[\w{])|(?<=\w\.)(?=\w{5})")
 _HYPHENED: Final = re.compile(r"(?<=[\s>\[])(?:--?[a-z]|[A-Za-z]+-)[\w-]*")
+# Three columns or more, in an output.
+_COLUMNS: Final = re.compile(r"^.*\S {2,}\S+ {2,}\S+ {2,}\S", re.MULTILINE)
+_NUMBERED: Final = re.compile(r"<tr>\n<td>\d+</td>\n<td[^>]*>[^\n]*</td>\n</tr>")
 _TABLE: Final = re.compile(r"<table>\n(.*?)</table>", re.DOTALL)
 
 
@@ -157,7 +161,8 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
     prose, rows, code = list[str](), list[str](), list[str]()
 
     def part() -> Part:
-        sentences = " ".join(prose)
+        # Items of a list may have no full stop.
+        sentences = re.sub(r"(?<=[\w)]) \n", " · ", " \n".join(prose)).replace("\n", "")
         return Part(heading, "\n".join(filter(None, [sentences, *rows, *code])), sentences)
 
     _label_cells(tokens)
@@ -183,7 +188,7 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
             if not tokens[at + 1].content:
                 token.tag = tokens[at + 2].tag = "td"  # a head without words names nothing
     parts.append(part())
-    _keep_intervals(tokens)
+    _keep_values(tokens)
     html = parser.renderer.render(tokens, parser.options, {})
     html = _NAMES.sub(lambda name: _LONG.sub(lambda long: _JOINT.sub("<wbr>", long[0]), name[0]), html)
     html = _CODE.sub(lambda code: _HYPHENED.sub(r'<span class="together">\g<0></span>', code[0]), html)
@@ -193,8 +198,8 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
     return Document(drawn, tuple(part for part in parts if part.heading.level or part.text))
 
 
-def _keep_intervals(tokens: Sequence[Token]) -> None:
-    """Keep each interval on one line, also one that the source breaks; code stays as it is."""
+def _keep_values(tokens: Sequence[Token]) -> None:
+    """Keep intervals and numbers with units on one line, also where the source breaks; code stays."""
     inline = _inline(tokens)
     for before, gap, after in zip(inline, inline[1:], inline[2:], strict=False):
         if gap.type == "softbreak" and before.type == after.type == "text":
@@ -202,20 +207,27 @@ def _keep_intervals(tokens: Sequence[Token]) -> None:
             before.content, gap.type = "", "text"
     for child in inline:
         if child.type == "text":
-            child.content = unbroken(child.content)
+            child.content = unbroken(child.content).replace("SHA-256", "SHA\N{NON-BREAKING HYPHEN}256")
 
 
 def _draw_code(token: Token) -> None:
-    """Draw the lines of an output or a synopsis, which nobody copies; without a language, code is one."""
+    """Draw the lines of an output or a synopsis, which nobody copies; without a language, code is one.
+
+    A line breaks where the page is narrow, but not in an output with columns.
+    """
     token.type, token.info = "fence", token.info or "text"
     if token.info in {"text", "console"}:
-        drawn = f'<pre><code class="language-{token.info}">{lined(token.content)}</code></pre>\n'
+        is_table = _COLUMNS.search(token.content)
+        lines = conditional_escape(token.content) if is_table else lined(token.content)
+        frame, more = ('<pre tabindex="0">', " tabular") if is_table else ("<pre>", "")
+        drawn = f'{frame}<code class="language-{token.info}{more}">{lines}</code></pre>\n'
         token.type, token.content = "html_block", drawn
 
 
 def _framed(table: re.Match[str]) -> str:
-    """Let a table scroll; one with sentences becomes cards on a phone."""
-    kind = "list cards" if 'class="wraps"' in table[1] else "list"
+    """Let a table scroll; one with sentences becomes cards on a phone, if it is no numbered list."""
+    is_list = 'class="wraps"' not in table[1] or _NUMBERED.search(table[1])
+    kind = "list" if is_list else "list cards"
     frame = '<div class="scroll" tabindex="0" role="group" aria-label="Table">'
     return f'{frame}\n<table class="{kind}">\n{table[1]}</table>\n</div>'
 

@@ -63,7 +63,7 @@ def test_every_file_is_taken_or_refused_in_words(edition: Edition, owner: User, 
         answer = json.loads(by_program.content)
         if len(data) >= LARGE_BYTES:
             assert (by_program.status_code, by_page.status_code) == (413, 413), name
-            assert re.search(r"The file has [\d,]+ kB; expected at most", answer["detail"]), name
+            assert re.search(r"The file is [\d,]+ kB; expected at most", answer["detail"]), name
         elif not data:
             # A slip of the hand, which the page tells at once.
             assert (by_program.status_code, by_page.status_code) == (201, 422), name

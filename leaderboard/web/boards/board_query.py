@@ -159,6 +159,7 @@ def tools(
         ],
         # The panel of filters is open only for a fault in it: chips name what is set.
         "has_fault": any(field["fault"] for field in fields),
+        "ignored": [each.label for name, each in FILTERS.items() if name != _SEARCH and faults.get(name)],
         "has_choices": any(text for name, text in given.items() if name != _SEARCH),
         "sentence": sentence(board, is_filtered=query.filters.is_set),
         "clear_href": query.href(**dict.fromkeys(FILTERS, "")),

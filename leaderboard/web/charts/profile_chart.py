@@ -31,9 +31,7 @@ def profile(entries: Sequence[Entry], *, n_metrics: int | None = None) -> Chart:
     if not shown:
         return empty("profile")
     panels = dict(list(grouped_names(shown[0].scores).items())[:n_metrics])
-    # A legend needs different names.
-    methods = [entry.method for entry in shown]
-    legend = [each if methods.count(each) == 1 else f"{each} [{k + 1}]" for k, each in enumerate(methods)]
+    legend = distinct_names(shown)
     frame = Frame(
         x_axes=[x_axis("", names_axis([_range_words(name) for name in names])) for names in panels.values()],
         y_axes=[error_axis(metric, _all_ends(shown, names)) for metric, names in panels.items()],
@@ -61,7 +59,7 @@ def profile(entries: Sequence[Entry], *, n_metrics: int | None = None) -> Chart:
         kind="profile",
         label=f"{' and '.join(metric.symbol for metric in panels)} by TTC range of {names}.",
         options=frame.options(),
-        columns=("Error", "TTC range", *(entry.method for entry in shown)),
+        columns=("Error", "TTC range", *legend),
         rows=tuple(
             (
                 metric_of(name).symbol,
@@ -72,6 +70,20 @@ def profile(entries: Sequence[Entry], *, n_metrics: int | None = None) -> Chart:
         ),
         has_intervals=any(each.low is not None for entry in shown for each in entry.intervals.values()),
     )
+
+
+def distinct_names(entries: Sequence[Entry]) -> list[str]:
+    """Name methods differently, as a legend needs: a name that repeats gets its team, year or position."""
+    methods = [entry.method for entry in entries]
+    asides = ([entry.team for entry in entries], [entry.year for entry in entries])
+    for aside in (*asides, range(1, len(entries) + 1)):
+        names = [
+            method if methods.count(method) == 1 else f"{method} ({words})"
+            for method, words in zip(methods, aside, strict=True)
+        ]
+        if len(set(names)) == len(names):
+            break
+    return names
 
 
 def _all_ends(shown: Sequence[Entry], names: Sequence[str]) -> list[float]:

@@ -22,6 +22,7 @@ _EXAMPLES: Final = _REPOSITORY / "examples"
 _NAMES: Final = {"index": "overview", "api": "api-guide", "adr/README": "decisions"}
 # The sections of the navigation: titles, and names of guides.
 _SECTIONS: Final[dict[str, dict[str, str]]] = {
+    "For everyone": {"Overview": "overview", "FAQ": "faq", "Compared with other leaderboards": "peers"},
     "For researchers": {
         "Quick start for researchers": "researchers",
         "Train a network": "training",
@@ -41,8 +42,6 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Problem codes": "problem-codes",
         "Exports": "exports",
         "Teams, quotas, tokens": "access",
-        "FAQ": "faq",
-        "Compared with other leaderboards": "peers",
     },
     "The numbers": {
         "Scoring": "scoring",
@@ -64,7 +63,6 @@ _SECTIONS: Final[dict[str, dict[str, str]]] = {
         "Reliability": "reliability",
     },
     "For developers": {
-        "Overview": "overview",
         "Architecture": "architecture",
         "Extending": "extending",
         "Decisions": "decisions",
@@ -129,8 +127,11 @@ def _entry(title: str, name: str) -> GuideLink:
 
 
 def neighbours(name: str) -> tuple[GuideLink | None, GuideLink | None]:
-    """Return the guides before and after this one."""
+    """Return the guides before and after this one; decisions follow their list."""
     entries = [entry for _, links in navigation() for entry in links]
+    if name.startswith("adr/"):
+        decisions = sorted(each for each in files() if each.startswith("adr/"))
+        entries = [_entry("Decisions", "decisions"), *(_entry(guide(each).title, each) for each in decisions)]
     at = next((n for n, entry in enumerate(entries) if entry.name == name), None)
     if at is None:
         return None, None

@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 from django.urls import reverse
 from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
+from django.utils.text import Truncator
 
 from leaderboard.web.docs import guides, python_reference
 from leaderboard.web.markdown import Part
@@ -14,6 +15,7 @@ MAX_QUERY: Final = 100
 MAX_HITS: Final = 12
 _MAX_COUNT: Final = 8
 _SNIPPET: Final = 200
+_BEFORE_CODE: Final = 12  # words
 # Pages of names, where a word is often a name: what explains it comes first.
 _REFERENCES: Final = frozenset({"cli", *python_reference.SECTIONS})
 _WORD: Final = re.compile(r"[^\W_]+")
@@ -98,8 +100,11 @@ def _snippet(part: Part, asked: list[re.Pattern[str]]) -> SafeString:
     pieces = (part.prose, *part.text.splitlines())
     best = max(pieces, key=lambda piece: sum(bool(word.search(piece)) for word in asked))
     text = " ".join((best or part.text).split())
+    is_code = part.prose and best != part.prose and " · " not in best
+    if is_code:  # a line of code says little alone
+        text = f"{Truncator(part.prose).words(_BEFORE_CODE)} {text}"
     first = marked.search(text)
-    begin = text.rfind(" ", 0, max(0, first.start() - 60)) + 1 if first else 0
+    begin = text.rfind(" ", 0, max(0, first.start() - 60)) + 1 if first and not is_code else 0
     end = len(text) if len(text) <= begin + _SNIPPET else text.rfind(" ", 0, begin + _SNIPPET)
     cut = enumerate(marked.split(text[begin:end].strip(" ·")))
     drawn = format_html_join("", "{}", ([format_html("<mark>{}</mark>", p) if n % 2 else p] for n, p in cut))

@@ -54,7 +54,7 @@ class RenameForm(ActionForm):
         label="New name",
         required=False,
         max_length=MAX_NAME,
-        help_text="To rename. A masked name is made by the site, such as Team 3f9c2a or Method 3f9c2a.",
+        help_text="Only to rename. To mask, leave it empty: the site makes a name, such as Team 3f9c2a.",
         widget=forms.TextInput(attrs={"autocomplete": "off"}),
     )
 

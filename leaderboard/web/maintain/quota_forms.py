@@ -11,7 +11,9 @@ from leaderboard.quotas.spans import parse_span, span
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_forms import reason_field
 
-_FOR_MAINTAINERS: Final = "One sentence for maintainers and the audit log. The team does not see it."
+_FOR_MAINTAINERS: Final = (
+    "Required: one sentence for maintainers and the audit log. The team does not see it."
+)
 
 
 class SpanField(forms.CharField):

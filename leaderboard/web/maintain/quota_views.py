@@ -93,9 +93,9 @@ def admit(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
             raise Http404 from None  # it has just ended
         messages.success(request, f"{team.name} is admitted to {split}.")
         return redirect("maintain_team_quotas", team.pk)
-    lead = "The team can submit to the split from now on."
+    lead = "Once admitted, the team can submit whenever the split is open."
     words = {"heading": "Admit a team", "lead": lead, "button": "Admit"}
-    subject = f"{team.name} on {split}"
+    subject = f"{team.name} on {split_row.title}"
     return form_page(request, "maintain/action.html", form, action=words, team=team, subject=subject)
 
 

@@ -43,6 +43,7 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
         "profile": profile,
         "chips": details.chips(profile.details),
         "visibility": row.visibility,
+        "section": "submissions" if is_mine and row.visibility == Visibility.PRIVATE else "board",
         "is_named": row.is_named_for(request.user),
         "is_mine": is_mine,
         "can_be_deleted": is_mine and empty_methods.can_be_deleted(row),

@@ -61,7 +61,7 @@ def test_milliseconds_are_distinguished_from_seconds_by_every_command(driven: Gr
     [warning] = warnings_of(predicted(driven, 1000 * driven.ttc_s))
     n = f"{driven.n_sequences:,}"
     assert warning.message.startswith(
-        f"{n} of {n} values lie beyond ±20 s; expected most of them within. Prob"
+        f"{n} of {n} values lie beyond ±20 s; expected most of them within ±20 s. They"
     )
 
 

@@ -43,7 +43,7 @@ def test_one_too_many_is_a_429_that_says_when_to_come_back(edition: Edition) -> 
     assert (response.status_code, body["code"]) == (429, "throttled")
     assert response.headers["Content-Type"] == "application/problem+json"
     assert 1 <= int(response.headers["Retry-After"]) <= NEXT_S
-    assert body["detail"].startswith("Too many requests in a short time; the next one is answered in ")
+    assert body["detail"].startswith("Too many requests in a short time; try again in ")
 
 
 def test_a_forwarding_header_does_not_change_who_is_counted(edition: Edition) -> None:

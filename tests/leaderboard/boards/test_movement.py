@@ -58,7 +58,7 @@ def test_page_tells_what_is_new_and_what_has_moved(months: list[Method], client:
     new = [
         row for row in root.one("table", class_="board").one("tbody").all("tr") if row.all("span", title=NEW)
     ]
-    assert {row.one("div", class_="name").text for row in new} == {f"{each.name} new" for each in months[6:]}
+    assert {row.one("div", class_="name").text for row in new} == {each.name for each in months[6:]}
     moved = movement.moved(board_of(), now=timezone.now())
     marks = [each.text for each in root.one("table", class_="board").one("tbody").all("span", class_="moved")]
     assert len(marks) == sum(1 for each in moved.values() if each)

@@ -178,7 +178,7 @@ def test_page_makes_a_link_shows_it_once_and_lets_a_user_in(
     assert "no-store" in response["Cache-Control"]
     main = pages.page(response).one("main")
     assert "Join Owls" in main.one("h1").text
-    assert "The team Strangers is deleted." in main.text
+    assert "The team Strangers is deleted; you cannot undo this." in main.text
     assert not Membership.objects.filter(user=stranger, team=team).exists()
     followed = client.post(address, follow=True)
     assert "You are now in the team Owls." in pages.page(followed).one("main").text

@@ -62,7 +62,7 @@ def test_shuffled_file_is_scored_and_its_team_is_warned(
     assert document["scores"]["mid"] is not None
     client.force_login(owner)
     notices = pages.page(client.get(f"/submissions/{shuffled.pk}/")).all("p", class_="notice")
-    assert [f"Warning. {warning['message']} shuffled-values"] == [notice.text for notice in notices]
+    assert [f"Warning. {warning['message']} Code: shuffled-values"] == [notice.text for notice in notices]
 
 
 def test_good_file_has_no_warning(client: Client, truth: evaluator.GroundTruth, owner: User) -> None:

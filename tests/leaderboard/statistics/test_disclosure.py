@@ -175,7 +175,7 @@ def test_an_anonymous_method_of_another_team_is_compared_once_it_is_public(
     plain(pair)
     assert pair.second.method in pair.withheld
     assert pair.second.method.startswith("Anonymous")
-    assert "have no interval or p-value until it is public" in pair.sentence()
+    assert "have no interval or p-value until the method is public" in pair.sentence()
     # Its own team may, where the values are open.
     (pair,) = ask(entries[0], other, viewer=stranger).pairs
     assert bool(pair.withheld) == is_hidden

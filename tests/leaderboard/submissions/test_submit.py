@@ -81,7 +81,7 @@ def test_refused_input_names_its_field_and_leaves_nothing(
 
 def test_file_over_the_limit_is_refused_with_both_sizes(edition: Edition, owner: User, settings) -> None:
     settings.MAX_PREDICTIONS_BYTES = 1000
-    with pytest.raises(Refused, match=r"has 2 kB; expected at most 1 kB"):
+    with pytest.raises(Refused, match=r"is 2 kB; expected at most 1 kB"):
         builders.submit(owner, b" " * 1001)
     assert not Submission.objects.exists()
 

@@ -63,6 +63,26 @@ def test_an_interval_stays_on_one_line_and_the_search_has_it_as_typed() -> None:
     assert drawn.parts[0].text == "From 1 to 5, −2 to 0.4, 3 to 4 and 6 to 7; back to it."
 
 
+def test_items_of_a_list_without_full_stops_are_set_apart_in_the_text() -> None:
+    drawn = markdown.page("## A\n\nBoth:\n\n- one\n- two (2)\n- three.\n\nAnd more\n")
+    assert drawn.parts[-1].prose == "Both: one · two (2) · three. And more"
+
+
+def test_an_output_with_columns_scrolls_and_other_lines_break() -> None:
+    root = pages.read(markdown.page("```text\na  1  2  3\nb  4  5  6\n```\n\n```text\none two\n```\n").html)
+    table, words = root.all("code")
+    assert "tabular" in table.attributes["class"]
+    assert not table.all("span")
+    assert "tabular" not in words.attributes["class"]
+    assert words.one("span", class_="line")
+
+
+def test_a_number_stays_with_its_unit() -> None:
+    drawn = markdown.page("At most 24\nhours, 0.05 s, 2 GB and 5 steps; `2 GB`.\n")
+    assert "24\xa0hours, 0.05\xa0s, 2\xa0GB and 5 steps; <code>2 GB</code>" in str(drawn.html)
+    assert drawn.parts[0].text == "At most 24 hours, 0.05 s, 2 GB and 5 steps; 2 GB."
+
+
 def test_a_column_without_a_name_has_no_head_and_numbers_stand_right() -> None:
     root = pages.read(markdown.page("| | n |\n|---|--:|\n| a | 1 |\n").html)
     assert [each.text for each in root.all("th")] == ["n"]
@@ -88,7 +108,9 @@ def test_short_cells_stay_in_one_line_and_long_ones_get_room() -> None:
     assert "<td>93.3\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}0.6</td>" in drawn
     assert '<td data-label="b" class="wraps">word word' in drawn, "with its head, for a phone"
     drawn = markdown.page("| a |\n|---|\n| Values lie beyond ±20 s: milliseconds |\n").html
-    assert ">Values lie beyond ±20 s:" in drawn, "a sentence breaks between its words"
+    assert ">Values lie beyond ±20\N{NO-BREAK SPACE}s: milliseconds" in drawn, (
+        "a sentence breaks between its words"
+    )
 
 
 def test_an_option_and_a_name_in_code_do_not_break_at_their_hyphens() -> None:

@@ -21,7 +21,7 @@ from leaderboard.boards.snapshots import Attempt
 from leaderboard.models import Comparison, Edition, Method, Submission, User
 from leaderboard.statistics import comparisons
 from leaderboard.statistics.comparisons import Pair
-from leaderboard.web.charts import analysis_charts, board_charts, chart_views
+from leaderboard.web.charts import analysis_charts, board_charts, chart_views, profile_chart
 from leaderboard.web.charts.chart_options import Mark
 from leaderboard.web.charts.chart_series import Look, named_marks
 from leaderboard.web.charts.significance_chart import alike_words
@@ -205,6 +205,22 @@ def test_leaders_by_range_stand_below_their_chart_as_a_table(
     assert [row.one("th").text for row in leads.all("tr")] == RANGES
     on_landing = get(client, "/").one("table", class_="attempts-list").one("tbody")
     assert leads.text == f"{leads.all('tr')[0].text}{on_landing.text}", "there the leaders stand above"
+
+
+@pytest.mark.parametrize(
+    ("rows", "names"),
+    [
+        ([("A", "x", 2021), ("B", "x", 2023)], ["A", "B"]),
+        ([("A", "x", 2021), ("A", "y", 2021), ("B", "x", 2023)], ["A (x)", "A (y)", "B"]),
+        ([("A", "x", 2021), ("A", "x", 2023)], ["A (2021)", "A (2023)"]),
+        ([("A", "x", None), ("A", "x", None)], ["A (1)", "A (2)"]),
+    ],
+)
+def test_methods_of_one_name_differ_by_team_then_year_then_position(
+    rows: list[tuple[str, str, int | None]], names: list[str]
+) -> None:
+    shown = [Entry("published", method, team, {}, year=year) for method, team, year in rows]
+    assert profile_chart.distinct_names(shown) == names
 
 
 def test_private_methods_are_in_no_chart_not_even_their_teams(

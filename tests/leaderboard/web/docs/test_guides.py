@@ -27,7 +27,7 @@ def test_every_page_of_the_documentation_has_the_navigation_and_marks_where_one_
         )
         assert [a.attributes["href"] for a in nav.all("a") if "aria-current" in a.attributes] == [address]
         n_open = sum("open" in group.attributes for group in nav.all("details"))
-        assert n_open == (4 if address == "/docs/" else 1)
+        assert n_open == (5 if address == "/docs/" else 1)
         listed = {a.attributes["href"] for a in nav.all("a")}
         assert {
             "/docs/researchers/",
@@ -134,9 +134,12 @@ def test_every_form_of_a_word_finds_the_part_that_explains_it(
     assert "/docs/scoring/#protocols" in [href for href, _ in search_hits(client, query)[:3]]
 
 
-def test_a_line_of_code_with_the_words_stands_alone() -> None:
+def test_a_line_of_code_with_the_words_follows_the_beginning_of_its_part() -> None:
     (hit,) = [each for each in search.find("truncation") if each.address == "/docs/annotation/#the-output"]
-    assert hit.snippet == "1,573 observations are <mark>truncated</mark>"
+    part = next(each for each in guides.guide("annotation").parts if each.heading.anchor == "the-output")
+    beginning, _, line = hit.snippet.partition("… ")
+    assert part.prose.startswith(beginning)
+    assert line == "1,573 observations are <mark>truncated</mark>"
 
 
 def test_a_list_of_results_that_was_cut_says_so(client: Client, benchmark: None) -> None:

@@ -2,15 +2,32 @@
 
 import inspect
 import re
+from typing import Final, get_args
 
 import evaluator
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, ProtocolName
+from evaluator.predictions.alignment import KeyKind
+from evaluator.predictions.documents import Unit
+from evaluator.scoring.breakdown import GroupName
 from evaluator.scoring.differences import N_SIGN_FLIPS, PUBLISHED_DECIMALS
+from evaluator.scoring.significance import P_CLASSES
+from evaluator.units import UnitKind
 from leaderboard.web.docs import guides, python_reference
 
 TEXTS = {name: python_reference.text(name) for name in python_reference.SECTIONS}
 TEXT = "\n".join(TEXTS.values())
 GUIDE = guides.files()["python-reference"].read_text(encoding="utf-8")
+OF_PYTHON: Final = {
+    *("Any", "Callable", "IO", "Iterable", "Iterator", "Literal", "Mapping", "None", "Path", "Sequence"),
+    *("False", "NDArray", "True"),
+}
+LITERALS: Final = {
+    "ProtocolName": ProtocolName,
+    "UnitKind": UnitKind,
+    "KeyKind": KeyKind,
+    "Unit": Unit,
+    "GroupName": GroupName,
+}
 ENTRIES = dict(re.findall(r"^### ([\w.]+)(?:\(\))?\n(.*?)(?=^##|\Z)", TEXT, re.MULTILINE | re.DOTALL))
 
 
@@ -35,6 +52,11 @@ def test_arguments_are_those_of_the_function() -> None:
     assert f"| `DEFAULT_PROTOCOL` | the protocol `{DEFAULT_PROTOCOL}` |" in GUIDE
     assert f"| `N_SIGN_FLIPS` | {N_SIGN_FLIPS:,} |" in GUIDE
     assert f"| `PUBLISHED_DECIMALS` | {PUBLISHED_DECIMALS} |" in GUIDE
+    assert f"| `P_CLASSES` | {P_CLASSES[0]}, {P_CLASSES[1]} and {P_CLASSES[2]} |" in GUIDE
+    for name, literal in LITERALS.items():
+        row = re.search(rf"^\| `{name}` \| (.*) \|$", GUIDE, re.MULTILINE)
+        assert row
+        assert re.findall(r'"([\w-]+)"', row[1]) == list(get_args(literal))
     assert "timeout_s: float = 15.0,\n    retry_policy: RetryPolicy = …," in ENTRIES["evaluator.Client"]
 
 
@@ -52,6 +74,14 @@ def test_each_page_has_its_reference_and_all_names_are_linked() -> None:
     links = set(re.findall(r"\]\((\S+\.md#[\w-]+)\)", TEXT))
     assert len(links) == len(ENTRIES)
     assert links <= anchors
+
+
+def test_every_type_and_constant_in_a_signature_is_explained() -> None:
+    signatures = "\n".join(re.findall(r"```text\n(?:def|class) (?:.*?)```|\*\*`\([^`]*`", TEXT, re.DOTALL))
+    named = set(re.findall(r"(?<![\w.'\"])[A-Z]\w+(?![\w'\".])", signatures))
+    words = "".join(guides.files()[name].read_text(encoding="utf-8") for name in TEXTS)
+    explained = set(re.findall(r"`(\w+)`", words)) | {name.rpartition(".")[2] for name in ENTRIES}
+    assert named - explained - OF_PYTHON == set()
 
 
 def test_a_type_links_to_the_class_of_its_own_package() -> None:

@@ -245,7 +245,7 @@ def test_ranks_of_quoted_rows_are_explained_where_they_are_missing(
     builders.score_all()
     open_edition(protocol="toolkit")
     builders.score_all()
-    assert ("The other ranks belong to rows quoted from papers" in main_text(keeper, SECOND)) == has_quoted
+    assert ("The missing ranks belong to rows quoted from papers" in main_text(keeper, SECOND)) == has_quoted
 
 
 def test_csv_has_every_number_and_guards_texts(keeper: Client, rescored: Edition) -> None:

@@ -41,7 +41,7 @@ def test_one_page_too_many_is_refused_in_words_with_a_time_and_a_way_back(
     assert 1 <= int(refused.headers["Retry-After"]) <= 3600
     main = pages.page(refused).one("main")
     assert main.text.startswith("Too many requests")
-    assert "Too many requests in a short time; the next one is answered in " in main.text
+    assert "Too many requests in a short time; try again in " in main.text
     assert "Nothing was changed" in main.text
     assert [link.attributes["href"] for link in main.all("a")] == ["/tokens/?a=b", "/board/"]
 
