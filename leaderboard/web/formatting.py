@@ -11,7 +11,7 @@ from evaluator import format_rounded
 from evaluator.counting import counted
 from leaderboard.boards.rows import ConfidenceInterval
 
-_UNITS = r"m?s|m|Hz|[KMG]i?B|TB|bits?|px|seconds?|minutes?|hours?|days?|weeks?|cores?"
+_UNITS = r"[mn]?s|c?m|Hz|[KMG]i?B|TB|bits?|px|seconds?|minutes?|hours?|days?|weeks?|cores?"
 _TOGETHER = re.compile(rf"(?<=\d) to (?=[+−]?\d)|(?<=\d) (?=(?:{_UNITS})\b)|(?<= s) [≤<] τ [≤<] (?=−?\d)")
 
 
@@ -139,6 +139,15 @@ def breakable(path: str) -> SafeString:
     """Let a path break after each slash, as HTML."""
     *folders, last = path.split("/")
     return format_html("{}{}", format_html_join("", "{}/<wbr>", ((part,) for part in folders)), last)
+
+
+def with_whole_dates(text: str) -> SafeString:
+    """Keep each date of a text on one line, as HTML whose text is the same.
+
+    >>> with_whole_dates("on 2026-11-24.")
+    'on <span class="together">2026-11-24</span>.'
+    """
+    return _alternating(re.split(r"(\d{4}-\d\d-\d\d)", text), '<span class="together">{}</span>')
 
 
 def lined(text: str) -> SafeString:

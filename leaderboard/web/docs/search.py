@@ -101,8 +101,9 @@ def _snippet(part: Part, asked: list[re.Pattern[str]]) -> SafeString:
     best = max(pieces, key=lambda piece: sum(bool(word.search(piece)) for word in asked))
     text = " ".join((best or part.text).split())
     is_code = part.prose and best != part.prose and " · " not in best
-    if is_code:  # a line of code says little alone
-        text = f"{Truncator(part.prose).words(_BEFORE_CODE)} {text}"
+    if is_code:  # a line of code says little alone, and one that goes on nothing
+        goes_on = text.endswith(("(", "{", ","))
+        text = part.prose if goes_on else f"{Truncator(part.prose).words(_BEFORE_CODE)} {text}"
     first = marked.search(text)
     begin = text.rfind(" ", 0, max(0, first.start() - 60)) + 1 if first and not is_code else 0
     end = len(text) if len(text) <= begin + _SNIPPET else text.rfind(" ", 0, begin + _SNIPPET)

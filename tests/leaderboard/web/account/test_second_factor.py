@@ -84,7 +84,7 @@ def set_up(client: Client, phone: Phone) -> list[str]:
 
 def test_who_has_an_app_needs_its_code_and_a_recovery_code_works_once(owner: User, phone: Phone) -> None:
     client = signed_in(owner)
-    assert "Set up an app" in assert_sound(client.get("/accounts/2fa/")).text
+    assert "Set up an authenticator app" in assert_sound(client.get("/accounts/2fa/")).text
     codes = set_up(client, phone)
     assert len(codes) == 10
     assert client.get("/accounts/2fa/recovery-codes/download/").text.split() == codes

@@ -244,7 +244,7 @@ def test_list_promises_of_a_withdrawn_submission_what_the_editions_show(
     client: Client, replaced: Edition
 ) -> None:
     lead = get(client, EDITIONS).one("p", class_="lead").text
-    assert "The exception is a withdrawn submission: it leaves every edition" in lead
+    assert "its scores leave every edition, and its row stays without values" in lead
 
 
 def test_every_page_that_stays_has_its_own_canonical_address(client: Client, replaced: Edition) -> None:
