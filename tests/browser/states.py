@@ -6,7 +6,7 @@ worker stands still meanwhile.
 
 import json
 from datetime import timedelta
-from typing import Final
+from typing import Any, Final
 
 from django.conf import settings
 from django.template.loader import render_to_string
@@ -83,11 +83,13 @@ def failures() -> str:
     """The pages for what goes wrong before or outside of any view, by name, as JSON."""
     too_many = {"sentence": rate_limits.refusal(125.0), "back": "/submit/"}
     too_large = {"sentence": intake.too_large(n_bytes=34_000_000)}
-    pages = {
+    # Only people who are signed in are refused a page, or send a file.
+    signed_in = {"user": User.objects.filter(is_active=True).first()}
+    pages: dict[str, tuple[str, dict[str, Any]]] = {
         "failure-400": ("400.html", {}),
-        "failure-403": ("403.html", {}),
+        "failure-403": ("403.html", signed_in),
         "failure-403-form": ("403_csrf.html", {}),
-        "failure-413": ("413.html", too_large),
+        "failure-413": ("413.html", too_large | signed_in),
         "failure-429": ("429.html", too_many),
         "failure-500": ("500.html", {}),
         "failure-503": ("outage.html", {"outage": outages.DATABASE_AWAY}),

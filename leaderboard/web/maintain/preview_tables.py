@@ -117,6 +117,9 @@ def _state_effects(preview: Preview) -> Iterator[str]:
     n = sum(Status.SCORED == e.new_status != e.old_status for e in preview.entries)
     if n:
         yield f"{counted(n, 'more submission')} {'is' if n == 1 else 'are'} scored."
+    if n := sum(e.new_status == ABSENT for e in preview.entries):
+        are = "is" if n == 1 else "are"
+        yield f"{counted(n, 'submission')} of the board {are} not evaluated in this edition."
 
 
 def _share(n: int, statuses: Iterable[str]) -> str:

@@ -23,6 +23,7 @@ from leaderboard.models import (
 )
 from tests import builders, pages
 from tests.editions import extended, open_edition, publish
+from tests.leaderboard.web.maintain import queue_rows
 from tests.leaderboard.web.maintain.desk import FIRST, HUB, OPEN, SECOND, effects, get, main_text
 
 pytestmark = pytest.mark.slow
@@ -126,6 +127,16 @@ def test_progress_is_sent_when_it_changes_and_ends_with_the_comparison(
 
 
 # --- the comparison --------------------------------------------------------------------------------------
+
+
+def test_comparison_counts_what_the_draft_does_not_evaluate(
+    keeper: Client, rescored: Edition, owner: User
+) -> None:
+    queue_rows.queued(Edition.objects.get(split="test", number=1), owner)
+    root = get(keeper, SECOND)
+    assert "1 submission of the board is not evaluated in this edition." in effects(root)
+    [about] = [each.text for each in root.all("div", class_="about") if "not evaluated" in each.text]
+    assert about.endswith(", not evaluated, was queued"), "a phone has no room for the column of states"
 
 
 def test_comparison_is_the_previews_line_by_line(keeper: Client, rescored: Edition) -> None:
