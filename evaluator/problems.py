@@ -49,11 +49,12 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "zero": "A time to contact is 0 (or too small for a float64), where both errors are meaningless.",
     "not-positive": "A scale ratio is not greater than 0.",
     "undefined-error": "Under the protocol `toolkit`, a prediction between −0.1 and 0 s has no error.",
-    # ground truth and manifests
+    # prediction files, ground truth and manifests
     "unreadable": "The file or folder cannot be read, or is of no known kind.",
     "bad-csv": "The text is not a CSV table.",
     "missing-columns": "The table lacks columns.",
     "bad-field": "A field of a row is empty, malformed or out of range.",
+    # ground truth and manifests
     "empty": "The table has no sequences.",
     "duplicate-ids": "An anno_id appears more than once.",
     "duplicate-natural-keys": "A natural key appears more than once.",

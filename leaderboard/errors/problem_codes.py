@@ -48,7 +48,7 @@ API_GROUPS: Final[dict[str, dict[str, str]]] = {
     },
     "Submitting": {
         "no-file": "No prediction file was sent.",
-        "too-large": "The file is larger than the limit.",
+        "too-large": "The file is larger than the limit, or a JSON document is larger than 100 kB.",
         "missing-field": "A required field is empty.",
         "text-too-long": "A field has too many characters.",
         "bad-character": "A field has a character that cannot be displayed.",

@@ -73,7 +73,7 @@ _PAGES: Final = frozenset(
     (
         *("account", "account_data", "mails", "submissions", "submit", "team", "tokens"),
         *("api-root", "api-schema", "api_reference", "docs"),
-        *("compare", "dist", "feed_of_all", "published"),
+        *("compare", "dist", "feed_of_all", "published", "site_page"),
     )
 )
 _SCHEMES: Final = {"http", "https", "mailto"}
