@@ -15,6 +15,10 @@ _UNITS = r"[mn]?s|c?m|Hz|[KMG]i?B|TB|bits?|px|seconds?|minutes?|hours?|days?|wee
 _TOGETHER = re.compile(rf"(?<=\d) to (?=[+−]?\d)|(?<=\d) (?=(?:{_UNITS})\b)|(?<= s) [≤<] τ [≤<] (?=−?\d)")
 
 
+# Four words or more, with wide gaps between them.
+_COLUMNS = re.compile(r"\S {2,}\S+ {2,}\S+ {2,}\S")
+
+
 def grouped(value: int | None) -> str:
     """Group thousands, as 28,600."""
     return "" if value is None else f"{value:,}"
@@ -151,8 +155,9 @@ def with_whole_dates(text: str) -> SafeString:
 
 
 def lined(text: str) -> SafeString:
-    """Let each line of an output be indented where it continues, as HTML."""
-    return format_html_join("", '<span class="line">{}\n</span>', ((line,) for line in text.splitlines()))
+    """Let each line of an output be indented where it continues, and keep one with columns whole, as HTML."""
+    lines = ((" tabular" if _COLUMNS.search(line) else "", line) for line in text.splitlines())
+    return format_html_join("", '<span class="line{}">{}\n</span>', lines)
 
 
 def day(at: datetime) -> SafeString:

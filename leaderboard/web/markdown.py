@@ -7,7 +7,6 @@ from functools import cache
 from itertools import pairwise
 from typing import Final
 
-from django.utils.html import conditional_escape
 from django.utils.safestring import SafeString
 from django.utils.text import slugify
 from markdown_it import MarkdownIt
@@ -29,8 +28,6 @@ _NAMES: Final = re.compile(r"(?<=<code>)[^<]+(?=</code>)|(?<=>)[^<]+(?=</h3>)")
 _LONG: Final = re.compile(r"\S{24,}")
 _JOINT: Final = re.compile(r"(?<=[\w}][/_])(?=[\w{])|(?<=\w\.)(?=\w{5})")
 _HYPHENED: Final = re.compile(r"(?<=[\s>\[])(?:--?[a-z]|[A-Za-z]+-)[\w-]*")
-# Three columns or more, in an output.
-_COLUMNS: Final = re.compile(r"^.*\S {2,}\S+ {2,}\S+ {2,}\S", re.MULTILINE)
 _NUMBERED: Final = re.compile(r"<tr>\n<td>\d+</td>\n<td[^>]*>[^\n]*</td>\n</tr>")
 _TABLE: Final = re.compile(r"<table>\n(.*?)</table>", re.DOTALL)
 
@@ -213,14 +210,13 @@ def _keep_values(tokens: Sequence[Token]) -> None:
 def _draw_code(token: Token) -> None:
     """Draw the lines of an output or a synopsis, which nobody copies; without a language, code is one.
 
-    A line breaks where the page is narrow, but not in an output with columns.
+    A line breaks where the page is narrow, but not one with columns.
     """
     token.type, token.info = "fence", token.info or "text"
     if token.info in {"text", "console"}:
-        is_table = _COLUMNS.search(token.content)
-        lines = conditional_escape(token.content) if is_table else lined(token.content)
-        frame, more = ('<pre tabindex="0">', " tabular") if is_table else ("<pre>", "")
-        drawn = f'{frame}<code class="language-{token.info}{more}">{lines}</code></pre>\n'
+        lines = lined(token.content)
+        frame = '<pre tabindex="0">' if "tabular" in lines else "<pre>"
+        drawn = f'{frame}<code class="language-{token.info}">{lines}</code></pre>\n'
         token.type, token.content = "html_block", drawn
 
 

@@ -163,7 +163,7 @@ def _change_row(change: Change, names: Sequence[str], preview: Preview) -> dict[
     return {
         "change": change,
         "has_changed": change.old_rank != change.new_rank,
-        "status": new_status if old_status == new_status else f"{new_status}, was {old_status}",
+        "status": new_status if old_status == new_status else f"{new_status} (before: {old_status})",
         "is_worse_off": change.old_status == Status.SCORED and change.new_status in _ENDED_BADLY,
         "differences": [_difference(name, change, preview) for name in names],
         "summary": reason.partition(": ")[0],

@@ -68,13 +68,10 @@ def test_items_of_a_list_without_full_stops_are_set_apart_in_the_text() -> None:
     assert drawn.parts[-1].prose == "Both: one · two (2) · three. And more"
 
 
-def test_an_output_with_columns_scrolls_and_other_lines_break() -> None:
-    root = pages.read(markdown.page("```text\na  1  2  3\nb  4  5  6\n```\n\n```text\none two\n```\n").html)
-    table, words = root.all("code")
-    assert "tabular" in table.attributes["class"]
-    assert not table.all("span")
-    assert "tabular" not in words.attributes["class"]
-    assert words.one("span", class_="line")
+def test_a_line_with_columns_stays_whole_and_its_output_scrolls() -> None:
+    root = pages.read(markdown.page("```text\na  1  2  3\none two\n```\n\n```text\none two\n```\n").html)
+    assert [each.attributes["class"] for each in root.all("span")] == ["line tabular", "line", "line"]
+    assert ["tabindex" in each.attributes for each in root.all("pre")] == [True, False]
 
 
 def test_a_number_stays_with_its_unit() -> None:

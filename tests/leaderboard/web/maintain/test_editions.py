@@ -136,7 +136,7 @@ def test_comparison_counts_what_the_draft_does_not_evaluate(
     root = get(keeper, SECOND)
     assert "1 submission of the board is not evaluated in this edition." in effects(root)
     [about] = [each.text for each in root.all("div", class_="about") if "not evaluated" in each.text]
-    assert about.endswith(", not evaluated, was queued"), "a phone has no room for the column of states"
+    assert about.endswith("not evaluated (before: queued)"), "a phone has no room for the column of states"
 
 
 def test_comparison_is_the_previews_line_by_line(keeper: Client, rescored: Edition) -> None:
@@ -194,7 +194,7 @@ def test_entries_that_become_rejected_say_why(
             "1 sequence has no value, added by a correction after the file was sent"
         )
         assert "expected a new file" in status.one("p").text
-        assert status.text.startswith("rejected, was scored")
+        assert status.text.startswith("rejected (before: scored)")
         assert "worse" in status.classes
     listed = main_text(keeper, f"{SECOND}publish/")
     assert "Edition 1 still shows what becomes rejected, marked: M1.05 (Owls)" in listed
