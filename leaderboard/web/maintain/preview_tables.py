@@ -117,9 +117,13 @@ def _state_effects(preview: Preview) -> Iterator[str]:
     n = sum(Status.SCORED == e.new_status != e.old_status for e in preview.entries)
     if n:
         yield f"{counted(n, 'more submission')} {'is' if n == 1 else 'are'} scored."
-    if n := sum(e.new_status == ABSENT for e in preview.entries):
-        are = "is" if n == 1 else "are"
-        yield f"{counted(n, 'submission')} of the board {are} not evaluated in this edition."
+    absent = [e.old_status == Status.SCORED for e in preview.entries if e.new_status == ABSENT]
+    for n, one, more in (
+        (absent.count(True), "scored submission is", "scored submissions are"),
+        (absent.count(False), "submission without a score is", "submissions without a score are"),
+    ):
+        if n:
+            yield f"{counted(n, one, more)} not evaluated in this edition."
 
 
 def _share(n: int, statuses: Iterable[str]) -> str:

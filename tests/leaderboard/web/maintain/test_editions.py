@@ -134,7 +134,7 @@ def test_comparison_counts_what_the_draft_does_not_evaluate(
 ) -> None:
     queue_rows.queued(Edition.objects.get(split="test", number=1), owner)
     root = get(keeper, SECOND)
-    assert "1 submission of the board is not evaluated in this edition." in effects(root)
+    assert "1 submission without a score is not evaluated in this edition." in effects(root)
     [about] = [each.text for each in root.all("div", class_="about") if "not evaluated" in each.text]
     assert about.endswith("not evaluated (before: queued)"), "a phone has no room for the column of states"
 
