@@ -235,7 +235,7 @@ def test_withdrawn_entry_leaves_its_mark_in_a_former_edition(
     assert row.one("div", class_="name").text == f"M1.05 withdrawn {withdrawn_at:%Y-%m-%d}"
     assert {cell.text for cell in row.all("td")} - {""} == {"–"}
     sentence = (
-        "One submission was withdrawn by its team. Its row remains in every edition, without scores or rank."
+        "One submission was withdrawn by its team. Its row remains in each edition that had scored it, without scores or rank."
     )
     assert sentence in root.one("main").text
 
@@ -244,7 +244,7 @@ def test_list_promises_of_a_withdrawn_submission_what_the_editions_show(
     client: Client, replaced: Edition
 ) -> None:
     lead = get(client, EDITIONS).one("p", class_="lead").text
-    assert "its scores leave every edition, and its row stays without values" in lead
+    assert "its row stays, without values, in the editions that had scored it" in lead
 
 
 def test_every_page_that_stays_has_its_own_canonical_address(client: Client, replaced: Edition) -> None:
