@@ -276,4 +276,4 @@ def _text_heading(name: str, query: BoardQuery) -> Heading:
 
 
 def _attempts(entry: Entry) -> str:
-    return "" if entry.n_attempts is None else counted(entry.n_attempts, "submission by the team", "submissions by the team")
+    return "" if entry.n_attempts is None else f"{counted(entry.n_attempts, 'submission')} by the team"

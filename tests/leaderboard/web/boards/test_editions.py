@@ -235,7 +235,8 @@ def test_withdrawn_entry_leaves_its_mark_in_a_former_edition(
     assert row.one("div", class_="name").text == f"M1.05 withdrawn {withdrawn_at:%Y-%m-%d}"
     assert {cell.text for cell in row.all("td")} - {""} == {"–"}
     sentence = (
-        "One submission was withdrawn by its team. Its row remains in each edition that had scored it, without scores or rank."
+        "One submission was withdrawn by its team. Its row remains in each edition that had scored it, "
+        "without scores or rank."
     )
     assert sentence in root.one("main").text
 

@@ -129,6 +129,16 @@ def test_progress_is_sent_when_it_changes_and_ends_with_the_comparison(
 # --- the comparison --------------------------------------------------------------------------------------
 
 
+def test_hub_tells_failures_of_an_earlier_edition_apart(
+    keeper: Client, rescored: Edition, owner: User
+) -> None:
+    queue_rows.queued(Edition.objects.get(split="test", number=1), owner)
+    queue_rows.strike_out()
+    assert "1 evaluation in edition 1 Inspect and retry" in main_text(keeper, HUB)
+    publish(rescored, leave_out=True)
+    assert "1 evaluation in edition 1, an earlier edition Inspect and retry" in main_text(keeper, HUB)
+
+
 def test_comparison_counts_what_the_draft_does_not_evaluate(
     keeper: Client, rescored: Edition, owner: User
 ) -> None:
