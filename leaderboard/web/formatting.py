@@ -12,7 +12,9 @@ from evaluator.counting import counted
 from leaderboard.boards.rows import ConfidenceInterval
 
 _UNITS = r"[mn]?s|c?m|Hz|[KMG]i?B|TB|bits?|px|seconds?|minutes?|hours?|days?|weeks?|cores?"
-_TOGETHER = re.compile(rf"(?<=\d) to (?=[+−]?\d)|(?<=\d) (?=(?:{_UNITS})\b)|(?<= s) [≤<] τ [≤<] (?=−?\d)")
+_TOGETHER = re.compile(
+    rf"(?<=\d) to (?=[+−]?\d)|(?<=\d) (?=(?:{_UNITS})\b)|(?<= s) [≤<] τ [≤<] (?=−?\d)|(?<=\bp) [=<≥] (?=\d)"
+)
 
 
 # Four words or more, with wide gaps between them.

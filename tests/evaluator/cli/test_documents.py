@@ -15,7 +15,7 @@ from evaluator.metrics.protocol import SCORE_NAMES
 from tests.evaluator.cli.console import DOCUMENTS, REPOSITORY, documented_shell, recorded
 
 GUIDE = REPOSITORY / "docs" / "cli.md"
-IN_COMMON = "What every command has in common"
+IN_COMMON = "What the commands have in common"
 # The table in this section has them for all commands, but some commands have their own --timeout.
 SHARED = {"--server", "--url", "--timeout"}
 
