@@ -131,7 +131,8 @@ def test_unfinished_submissions_are_listed_and_left_out_only_knowingly(
     assert "4 submissions are neither scored nor rejected" in sentence
     assert keeper.post(f"{SECOND}publish/", {**data, "leave_out": "on"}).status_code == 302
     assert board_number() == 2
-    assert "4 submissions were left out." in main_text(keeper, "/board/test/editions/")
+    history = main_text(keeper, "/board/test/editions/")
+    assert "Without 4 submissions that were not finished or no longer accepted." in history
 
 
 def test_rolling_back_returns_the_board_as_it_was(
