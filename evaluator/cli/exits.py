@@ -23,7 +23,7 @@ class Exit(IntEnum):
 MEANINGS: Final[dict[Exit, str]] = {
     Exit.GOOD: "success",
     Exit.REJECTED: "the file is at fault: rejected, too large, malformed, or an invalid receipt",
-    Exit.USAGE: "wrong usage: an unknown option or name, a file that cannot be opened or written",
+    Exit.USAGE: "wrong usage: an unknown option or name, an unusable path, or no confirmation (--yes)",
     Exit.NETWORK: "network: no leaderboard at the address, or an incomplete answer",
     Exit.AUTH: "token: missing, not accepted, or without the necessary scope",
     Exit.QUOTA: "not now: the quota is used up, or too many requests in a short time",

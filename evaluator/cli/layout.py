@@ -104,7 +104,7 @@ def result_in_words(
     yield units(scores)
     outside = f", {n_out_of_range:,} of them in no TTC range, which count in the overall scores only"
     yield f"{counted(counts.get(OVERALL, 0), 'sequence')}{outside if n_out_of_range else ''}."
-    cut = [f"{n:,} to {boundary} s" for boundary, n in truncated.items() if n]
+    cut = [f"{n:,} set to {boundary.replace('-', '−')} s" for boundary, n in truncated.items() if n]
     yield f"Truncated predictions: {', '.join(cut) or 'none'}."
 
 

@@ -120,7 +120,7 @@ def test_wait_ends_with_the_scores(tsttc: Tsttc, site: RecordedSite) -> None:
     assert lines[3].split() == COLUMNS
     assert lines[4].split()[:4] == ["error", "10.25", "11.25", "–"]
     assert "28,600 sequences, 458 of them in no TTC range, which count in the overall scores only." in lines
-    assert "Truncated predictions: 3 to -20 s, 1 to 0.05 s, 12 to 20 s." in lines
+    assert "Truncated predictions: 3 set to −20 s, 1 set to 0.05 s, 12 set to 20 s." in lines
 
 
 def test_json_is_the_server_s_document_alone(tsttc: Tsttc, site: RecordedSite) -> None:
