@@ -61,7 +61,10 @@ def test_shuffled_file_is_scored_and_its_team_is_warned(
     assert warning["code"] == "shuffled-values"
     assert document["scores"]["mid"] is not None
     client.force_login(owner)
-    notices = pages.page(client.get(f"/submissions/{shuffled.pk}/")).all("p", class_="notice")
+    page = pages.page(client.get(f"/submissions/{shuffled.pk}/"))
+    notices = page.all("p", class_="notice")
+    first = page.one("p", class_="next").all("a")[0]
+    assert (first.text, first.attributes["class"]) == ("Submit a corrected file", "button")
     assert [f"Warning. {warning['message']} Code: shuffled-values"] == [notice.text for notice in notices]
 
 

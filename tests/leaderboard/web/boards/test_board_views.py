@@ -136,7 +136,10 @@ def test_chips_say_what_is_filtered_and_the_panel_opens_for_a_fault_alone(
     filtered = client.get("/board/test/?frames=2")
     assert "open" not in panel(filtered).attributes
     assert [chip.text for chip in pages.page(filtered).all("a", class_="chip")] == ["Frames used: 2"]
-    assert "open" in panel(client.get("/board/test/?frames=9")).attributes
+    assert "Not applied" not in pages.page(filtered).one("p", class_="found").text
+    wrong = client.get("/board/test/?frames=9")
+    assert "open" in panel(wrong).attributes
+    assert "Not applied: Frames used" in pages.page(wrong).one("p", class_="found").text
 
 
 def test_filters_that_nothing_fits_leave_a_sentence_and_a_way_back(

@@ -195,3 +195,12 @@ def test_a_page_of_several_sections_lists_them_and_each_link_has_its_heading(
         ids = [e.attributes["id"] for e in page.everything() if "id" in e.attributes]
         assert [ids.count(name) for name in listed] == [1] * len(listed)
         assert {e.attributes["id"] for e in page.all("h2")} - {"operations"} <= set(listed)
+
+
+def test_decisions_follow_their_list_and_each_other() -> None:
+    decisions = sorted(name for name in guides.files() if name.startswith("adr/"))
+    before, after = guides.neighbours(decisions[0])
+    assert before
+    assert after
+    assert (before.name, after.name) == ("decisions", decisions[1])
+    assert guides.neighbours(decisions[-1])[1] is None
