@@ -48,7 +48,7 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "nan": "A value is NaN.",
     "zero": "A time to contact is 0 (or too small for a float64), where both errors are meaningless.",
     "not-positive": "A scale ratio is not greater than 0.",
-    "undefined-error": "Under the protocol `toolkit`, a prediction between −0.1 and 0 s has no error.",
+    "undefined-error": "Under the protocol `toolkit`, the MiD of a prediction between −0.1 and 0 s is undefined.",
     # prediction files, ground truth and manifests
     "unreadable": "The file or folder cannot be read, or is of no known kind.",
     "bad-csv": "The text is not a CSV table.",
