@@ -48,7 +48,7 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "nan": "A value is NaN.",
     "zero": "A time to contact is 0 (or too small for a float64), where both errors are meaningless.",
     "not-positive": "A scale ratio is not greater than 0.",
-    "undefined-error": "Under the protocol `toolkit`, the MiD of a prediction between −0.1 and 0 s is undefined.",
+    "undefined-error": "Under the protocol `toolkit`, a prediction from −0.1 to 0 s has no defined MiD.",
     # prediction files, ground truth and manifests
     "unreadable": "The file or folder cannot be read, or is of no known kind.",
     "bad-csv": "The text is not a CSV table.",
