@@ -32,6 +32,11 @@ def test_alarms_ask_for_figures_that_there_are_and_say_what_is_wrong() -> None:
     assert all(rule["annotations"]["summary"].endswith(".") for rule in rules)
     scrape = yaml.safe_load((DEPLOY / "prometheus/scrape.yml").read_text())
     assert scrape["rule_files"] == ["rules.yml"]
+    # Where the web process listens, with and without containers.
+    text = (DEPLOY / "prometheus/scrape.yml").read_text()
+    assert "127.0.0.1:8000" in text
+    assert "web:8000" in text
+    assert "reverse_proxy web:8000" in (DEPLOY / "Caddyfile").read_text()
 
 
 def test_the_board_of_grafana_shows_figures_that_there_are() -> None:

@@ -10,6 +10,8 @@ MIDDLEWARE: Final = [
     "leaderboard.web.middleware.request_log.RequestLogMiddleware",
     # What anything below answers, from memory or from a view, gets the same headers.
     "leaderboard.web.middleware.response_headers.HeadersMiddleware",
+    # Before anything that asks for the name of the site.
+    "leaderboard.web.middleware.monitoring_host.MonitoringHostMiddleware",
     "django.middleware.security.SecurityMiddleware",
     "whitenoise.middleware.WhiteNoiseMiddleware",
     "csp.middleware.CSPMiddleware",

@@ -13,6 +13,7 @@ from leaderboard.errors import problem_codes
 from leaderboard.ops import rate_limits
 from leaderboard.submissions import intake
 from leaderboard.web.lookups import page_before
+from leaderboard.web.middleware import monitoring_host
 
 # Room for the other fields and the boundaries of a multipart body.
 FORM_BYTES = 100_000
@@ -62,7 +63,7 @@ class RateLimitMiddleware:
     """Answers 429 to too many requests; cached answers are not counted."""
 
     # The API counts by itself, and monitoring is not limited.
-    ELSEWHERE: Final = ("/api/", "/healthz", "/readyz", "/healthy", "/metrics")
+    ELSEWHERE: Final = ("/api/", *monitoring_host.ADDRESSES)
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponse]) -> None:
         self.get_response = get_response

@@ -9,9 +9,10 @@ from django.utils.functional import SimpleLazyObject
 from django_structlog.middlewares import RequestMiddleware
 
 from leaderboard.ops import prometheus
+from leaderboard.web.middleware import monitoring_host
 
 # Asked every few seconds by machines; worth a line only when they fail.
-QUIET = frozenset({"/healthz", "/readyz", "/healthy", "/metrics"})
+QUIET = monitoring_host.ADDRESSES
 
 # What comes behind this is the secret of an invitation.
 SECRET_PATH = re.compile(r"^(/team/join/).+", re.DOTALL)

@@ -104,10 +104,29 @@ def test_with_a_token_the_token_alone_decides(
         assert response.status_code == (200 if is_allowed else 403)
 
 
+@pytest.mark.parametrize("host", ["web:8000", "10.0.0.7:8000", "127.0.0.1:8000", "no_name"])
+def test_monitoring_is_answered_under_any_name_and_nothing_else_is(
+    db: None, settings: Settings, host: str
+) -> None:
+    settings.ALLOWED_HOSTS = ["board.example.org"]
+    settings.SITE_URL = "https://board.example.org"
+    client = Client(HTTP_HOST=host)
+    for address in ("/healthz", "/readyz", "/metrics"):
+        answer = client.get(address)
+        assert answer.status_code == 200, address
+        assert host not in answer.text
+    assert client.get("/healthy").status_code in {200, 503}
+    for address in ("/", "/metrics/", "/board/test/", "/api/v1/boards", "//metrics", "/metrics%2F.."):
+        answer = client.get(address)
+        assert answer.status_code in {400, 404}, address
+        assert host not in answer.headers.get("Location", "")
+    assert client.get("/").status_code == 400
+
+
 def test_every_figure_is_documented_and_nothing_else(client: Client, db: None) -> None:
     client.get("/healthz")  # of answers, there are figures once there was one
     documented = set(re.findall(r"\btsttc_[a-z_]+", (REPOSITORY / "docs" / "operations.md").read_text()))
-    documented -= {"tsttc_application"}  # a role of the database
+    documented -= {"tsttc_application", "tsttc_pages"}  # a role of the database, and a network
     families = list(text_string_to_metric_families(prometheus.exposition().decode()))
     given = {f"{family.name}_total" if family.type == "counter" else family.name for family in families}
     assert len(given) >= 9
