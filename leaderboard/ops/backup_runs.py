@@ -14,7 +14,8 @@ _MAX_CHARACTERS: Final = 2_000
 def begin(now: datetime) -> BackupRun:
     """Record that a backup begins, and forget runs older than `KEPT`. Raises the database's error."""
     good = last_good()
-    BackupRun.objects.filter(started_at__lt=now - KEPT).exclude(pk=good.pk if good else None).delete()
+    is_kept = Q(pk=good.pk) if good else Q(pk=None)
+    BackupRun.objects.filter(started_at__lt=now - KEPT).exclude(is_kept).delete()
     return BackupRun.objects.create(started_at=now)
 
 
