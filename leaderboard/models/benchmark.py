@@ -229,6 +229,11 @@ class Edition(UnitOfInference):
         default=1,
         help_text="With how many decimals everything of it is published; the split's when it was opened.",
     )
+    least_step = models.FloatField(
+        null=True,
+        default=0.5,
+        help_text="The least step between ends of intervals of hidden values; null in earlier editions.",
+    )
     opened_at = models.DateTimeField(default=timezone.now)
     opened_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
     published_at = models.DateTimeField(null=True, blank=True, help_text="When it first was the board.")

@@ -1,9 +1,9 @@
 """How finely intervals and p-values of hidden splits are published, and for what pairs.
 
 A file can be made so that such numbers give labels away. On a hidden split the ends of intervals are
-therefore rounded outwards to about a tenth of their width, p is a class, and only public methods of different
-teams are compared; teams get the same of their own methods. See `docs/security.md` and
-`tests/security/probing.py`.
+therefore rounded outwards, to a step of the edition or to about a tenth of their width if that is more, p is
+a class, and only public methods of different teams are compared; teams get the same of their own methods. See
+`docs/security.md` and `tests/security/probing.py`.
 """
 
 import math
@@ -31,15 +31,18 @@ HIDDEN_METRICS: Final = frozenset({MID, RTE})
 # --- how fine --------------------------------------------------------------------------------------------
 
 
-def step_of(width: float, *, decimals: int) -> float:
+def step_of(width: float, *, decimals: int, least: float | None = None) -> float:
     """Return the grid of an interval's ends: 1, 2 or 5 times a power of ten, at most a tenth of `width`.
 
-    Never finer than scores are published.
+    Never finer than scores are published, nor than `least`, the step of the edition: a narrow interval would
+    otherwise have fine ends, and an attacker's files can have narrow intervals.
 
     >>> step_of(7.1, decimals=1), step_of(0.3, decimals=1), step_of(24.0, decimals=1)
     (0.5, 0.1, 2.0)
+    >>> step_of(0.3, decimals=1, least=0.5), step_of(24.0, decimals=1, least=0.5)
+    (0.5, 2.0)
     """
-    finest = round(10.0**-decimals, decimals)
+    finest = max(round(10.0**-decimals, decimals), least or 0.0)
     tenth = width / STEPS_IN_A_WIDTH
     if not tenth > finest:
         return finest
@@ -48,13 +51,15 @@ def step_of(width: float, *, decimals: int) -> float:
     return max(round(step, decimals), finest)
 
 
-def coarse_ends(low: float, high: float, *, decimals: int) -> tuple[float, float]:
+def coarse_ends(low: float, high: float, *, decimals: int, least: float | None = None) -> tuple[float, float]:
     """Round both ends of an interval outwards to their grid.
 
     >>> coarse_ends(13.61, 20.68, decimals=1), coarse_ends(-0.31, 0.02, decimals=1)
     ((13.5, 21.0), (-0.4, 0.1))
+    >>> coarse_ends(-0.31, 0.02, decimals=1, least=0.5)
+    (-0.5, 0.5)
     """
-    step = step_of(high - low, decimals=decimals)
+    step = step_of(high - low, decimals=decimals, least=least)
     # What is left of rounding must not move an end that stands on the grid.
     slack = 1e-9
     ends = math.floor(low / step + slack) * step, math.ceil(high / step - slack) * step
@@ -77,7 +82,7 @@ def published_ends(low: Floats, high: Floats, *, edition: Edition) -> tuple[Floa
         return np.round(low, edition.decimals), np.round(high, edition.decimals)
     shown = np.array(
         [
-            (np.nan, np.nan) if np.isnan(a) or np.isnan(b) else coarse_ends(a, b, decimals=edition.decimals)
+            (np.nan, np.nan) if np.isnan(a) or np.isnan(b) else _ends_of(a, b, edition=edition)
             for a, b in zip(low.ravel().tolist(), high.ravel().tolist(), strict=True)
         ]
     ).reshape(-1, 2)
@@ -92,9 +97,13 @@ def published_difference(computed: Difference, shown: Difference, *, edition: Ed
     """
     if computed.low is None or computed.high is None or not is_hidden(edition):
         return shown
-    low, high = coarse_ends(computed.low, computed.high, decimals=edition.decimals)
+    low, high = _ends_of(computed.low, computed.high, edition=edition)
     low, high = min(low, shown.difference), max(high, shown.difference)
     return replace(shown, low=low, high=high, p=None)
+
+
+def _ends_of(low: float, high: float, *, edition: Edition) -> tuple[float, float]:
+    return coarse_ends(low, high, decimals=edition.decimals, least=edition.least_step)
 
 
 # --- of which pairs --------------------------------------------------------------------------------------

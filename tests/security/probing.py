@@ -1,12 +1,15 @@
 """What one more submission tells of hidden labels, with two decimals and with the one that is published.
 
-    python -m tests.security.probing --readouts 6  the table of docs/hidden-values.md, some minutes
-    python -m tests.security.probing --quick       a small one
+    python -m tests.security.probing --readouts 6  the tables of docs/hidden-values.md, half an hour
+    python -m tests.security.probing --quick       small ones
 
-File 0 predicts ln α10 = 0.6 for every sequence. That is above every true value, so MiD is linear in what is
-predicted: moving one prediction moves the mean of one range by a known amount, and of no other. File 1 moves
-one sequence in each of K recordings, each by an amount of its own. What is published of file 1 beside file 0
-then tells which ranges the chosen sequences are in.
+File 0 is one of two files, `BASES`. *near* predicts 0.05 s for every sequence, which is below every true
+value; *good* is a good file, such as anybody sends. File 1 moves one prediction in each of K recordings, each
+by an amount of its own. So it moves the sum of MiD of one range by a known amount, and of no other. What is
+published of file 1 beside file 0 then tells which ranges the chosen sequences are in.
+
+Two things are in favour of the attacker. With the good file an amount depends a little on the label; here the
+attacker knows it exactly. And file 1 of *near* is linear only if no chosen object is nearer than 0.48 s.
 
 The decoder here is the best that there is: it computes what would be published under every hypothesis about
 the labels, keeps the hypotheses that fit, weighs them by how common each range is, and names the likeliest
@@ -14,11 +17,12 @@ range of each sequence. `bits` is what it has learnt: −log2 of the share of hy
 """
 
 import argparse
+import itertools
 import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,30 +31,54 @@ from evaluator import Difference, rounded
 from evaluator.scoring.differences import rounded_difference, sign_flips
 from evaluator.scoring.uncertainty import Bootstrap
 
+if TYPE_CHECKING:
+    from leaderboard.models import Edition
+
 Floats = NDArray[np.float64]
 Masks = NDArray[np.int64]
 
 RANGES: Final = ("crucial", "small", "large", "negative")
 SHARES: Final = np.array([0.09, 0.20, 0.43, 0.264])  # of all sequences; the rest is out of range
-LOG_RATIO: Final = 0.6
-# Predictions may lie within ln α10 = ± ln 3: so far up a prediction can be moved, times 10⁴.
-LARGEST: Final = (np.log(3) - LOG_RATIO) * 1e4
+
+# Predictions lie within ln α10 = ± ln 3, and MiD is 10⁴ times the distance of two of them.
+LIMIT: Final = np.log(3) * 1e4
+# The true value of an object that is 0.48 s away: no label of the dataset is nearer.
+NEAREST: Final = 0.19 * 1e4
+
+
+@dataclass(frozen=True)
+class Base:
+    """A kind of file 0, and the largest amount by which file 1 can change the MiD of a sequence.
+
+    `sign` is −1 where a move lowers the error.
+    """
+
+    name: str
+    largest: float
+    sign: int
+
+
+NEAR: Final = Base("near: 0.05 s for every sequence", LIMIT - NEAREST, -1)
+GOOD: Final = Base("good: errors as those of a method", LIMIT, +1)
+BASES: Final = (NEAR, GOOD)
 # Amounts run down to a 128th: powers of two where 8 sequences are chosen.
 SPREAD: Final = 128.0
+# Public methods of other teams, with which both files are compared.
+MOST_RIVALS: Final = 8
 
 
 @dataclass(frozen=True)
 class World:
     """A hidden truth of G recordings, and K sequences whose ranges an attacker wants to know.
 
-    `counts` are the sequences per recording and range, (G, 4); `base` and `rival` the sums of MiD of file 0
-    and of a method of another team. Sequence i is in recording i, is moved by `amounts[i]`, and is in the
-    range `labels[i]`; 4 is out of range.
+    `counts` are the sequences per recording and range, (G, 4); `base` and `rivals` the sums of MiD of file 0,
+    and of R methods of other teams, (R, G, 4). Sequence i is in recording i, is moved by `amounts[i]`, and is
+    in the range `labels[i]`; 4 is out of range.
     """
 
     counts: Floats
     base: Floats
-    rival: Floats
+    rivals: Floats
     amounts: Floats
     labels: NDArray[np.int64]
 
@@ -77,7 +105,9 @@ class World:
         return added
 
 
-def world(*, n_chosen: int, n_sequences: int, n_recordings: int, rng: np.random.Generator) -> World:
+def world(
+    *, n_chosen: int, n_sequences: int, n_recordings: int, rng: np.random.Generator, base: Base = NEAR
+) -> World:
     """A world of recordings of very different sizes, in which each has its own mean of ln α10."""
     sizes = rng.lognormal(0, 0.8, n_recordings)
     sizes = np.maximum(sizes / sizes.sum() * n_sequences, 4)
@@ -85,13 +115,14 @@ def world(*, n_chosen: int, n_sequences: int, n_recordings: int, rng: np.random.
     counts = np.maximum(np.round(sizes[:, None] * shares), 1.0)
     of_ranges = np.array([0.06, 0.024, 0.009, -0.01])  # ln(1 / α10)
     log_ratios = of_ranges * rng.lognormal(0, 0.2, (n_recordings, 4))
-    noise = rng.gamma(2.0, 20.0, (n_recordings, 4))
-    amounts = LARGEST / SPREAD ** (np.arange(n_chosen) / max(n_chosen - 1, 1))
+    noise = rng.gamma(2.0, 20.0, (MOST_RIVALS, n_recordings, 4))
+    errors = {NEAR: LIMIT - 1e4 * log_ratios, GOOD: rng.gamma(2.0, 7.0, (n_recordings, 4))}[base]
+    amounts = base.largest / SPREAD ** (np.arange(n_chosen) / max(n_chosen - 1, 1))
     return World(
         counts=counts,
-        base=counts * (LOG_RATIO + log_ratios) * 1e4,
-        rival=counts * noise,
-        amounts=rng.permutation(amounts) * rng.choice([-0.6, 1.0], n_chosen),
+        base=counts * errors,
+        rivals=counts * noise,
+        amounts=rng.permutation(amounts) * base.sign,
         labels=rng.choice(5, n_chosen, p=np.append(SHARES, 1 - SHARES.sum())),
     )
 
@@ -107,8 +138,17 @@ def all_that_is_left(world: World, column: int, masks: Masks) -> Answers:
 
     The mean and its interval, and difference, interval and class of p next to another team's public method.
     """
+    return _published_beside(1, world, column, masks)
+
+
+def beside_many(world: World, column: int, masks: Masks) -> Answers:
+    """The same next to the public methods of eight other teams."""
+    return _published_beside(MOST_RIVALS, world, column, masks)
+
+
+def _published_beside(n_rivals: int, world: World, column: int, masks: Masks) -> Answers:
     sums = world.base[:, [column]] + world.moved(masks)
-    return _published_of(world.counts[:, [column]], sums, rival=world.rival[:, [column]])
+    return _published_of(world.counts[:, [column]], sums, rivals=world.rivals[:n_rivals, :, [column]])
 
 
 def with_warnings(world: World, column: int, masks: Masks) -> Answers:
@@ -122,7 +162,7 @@ def all_with_warnings(world: World, column: int, masks: Masks) -> Answers:
     """All that is published of both errors, for the reader of `all_that_is_left`."""
     sums = _warning_base(world, column) + world.warned(column, masks)
     counts = world.counts[:, [column]]
-    warnings = _published_of(counts, sums, rival=counts * 5)
+    warnings = _published_of(counts, sums, rivals=counts[None] * 5)
     return [
         (*one, *other) for one, other in zip(all_that_is_left(world, column, masks), warnings, strict=True)
     ]
@@ -132,14 +172,28 @@ def _warning_base(world: World, column: int) -> Floats:
     return world.counts[:, [column]] * (100.0 if column == 0 else 0.0)
 
 
-def _published_of(counts: Floats, sums: Floats, *, rival: Floats) -> Answers:
-    """What is published of each of these sums of one error (G, hypotheses), and a rival's (G, 1)."""
+def _published_of(counts: Floats, sums: Floats, *, rivals: Floats) -> Answers:
+    """What is published of each of these sums of one error (G, hypotheses), and of rivals (R, G, 1)."""
     from leaderboard.models import Edition, Split  # noqa: PLC0415 - needs Django's settings
     from leaderboard.statistics import disclosure  # noqa: PLC0415 - likewise
 
     edition = Edition(split=Split(is_hidden=True), decimals=1)
     low, high = Bootstrap(counts, rng=np.random.default_rng(2)).intervals(sums.T[:, :, None])
     ends = np.concatenate(disclosure.published_ends(low, high, edition=edition), axis=1)
+    answers: list[tuple[float | str | None, ...]] = [
+        (*map(repr, ends[i].tolist()), rounded(total / counts.sum(), decimals=1))
+        for i, total in enumerate(sums.sum(axis=0).tolist())
+    ]
+    for rival in rivals:
+        differences = _published_differences(counts, sums, rival=rival, edition=edition)
+        answers = [(*answer, *found) for answer, found in zip(answers, differences, strict=True)]
+    return answers
+
+
+def _published_differences(counts: Floats, sums: Floats, *, rival: Floats, edition: "Edition") -> Answers:
+    """What is published of the difference of each of these sums (G, hypotheses) from a rival's (G, 1)."""
+    from leaderboard.statistics import disclosure  # noqa: PLC0415 - needs Django's settings
+
     gaps = sums - rival
     flips = sign_flips(gaps, np.repeat(counts, sums.shape[1], axis=1), rng=np.random.default_rng(3))
     answers = []
@@ -153,9 +207,7 @@ def _published_of(counts: Floats, sums: Floats, *, rival: Floats) -> Answers:
         mean, other = total / counts.sum(), rival.sum() / counts.sum()
         shown = rounded_difference(gap, first=mean, second=other, decimals=1)
         public = disclosure.published_difference(gap, shown, edition=edition)
-        answers.append(
-            (*map(repr, ends[i].tolist()), rounded(mean, decimals=1), public.low, public.high, public.p_below)
-        )
+        answers.append((public.low, public.high, public.p_below))
     return answers
 
 
@@ -234,6 +286,7 @@ WAYS: Final[dict[str, tuple[int, Channel | None]]] = {
     "means, one decimal, as published": (1, None),
     "the same and the warning error": (1, with_warnings),
     "bound, if all but the chosen labels were known": (1, all_that_is_left),
+    "the same beside 8 other public methods, bound": (1, beside_many),
     "the same and the warning error, bound": (1, all_with_warnings),
 }
 
@@ -254,13 +307,19 @@ def _mean(values: Sequence[float]) -> Mean:
 
 
 def measured(
-    *, n_chosen: int, n_sequences: int, n_recordings: int, n_readouts: int, seed: int = 0
+    *,
+    n_chosen: int,
+    n_sequences: int,
+    n_recordings: int,
+    n_readouts: int,
+    base: Base = NEAR,
+    seed: int = 0,
 ) -> dict[str, tuple[Mean, Mean]]:
     """For each way the sequences named rightly and the bits, each with its mean and its standard error."""
     readouts_by_way: dict[str, list[Readout]] = {name: [] for name in WAYS}
     for k in range(n_readouts):
         rng = np.random.default_rng((seed, k))
-        of = world(n_chosen=n_chosen, n_sequences=n_sequences, n_recordings=n_recordings, rng=rng)
+        of = world(n_chosen=n_chosen, n_sequences=n_sequences, n_recordings=n_recordings, rng=rng, base=base)
         for name, (decimals, channel) in WAYS.items():
             readouts_by_way[name].append(read(of, decimals=decimals, channel=channel))
     return {
@@ -280,20 +339,23 @@ def main() -> None:
     options = parser.parse_args()
     chosen = (8,) if options.quick else (8, 12)
     n_readouts = options.readouts or (3 if options.quick else 12)
-    for n_sequences, n_recordings in ((4_000, 100), (28_600, 400)):
-        for n_chosen in chosen:
-            sys.stdout.write(
-                f"{n_sequences:,} sequences, {n_recordings} recordings, {n_chosen} chosen, {n_readouts} "
-                f"readouts; always naming “large”: {SHARES[2] * n_chosen:.1f}\n"
-            )
-            table = measured(
-                n_chosen=n_chosen,
-                n_sequences=n_sequences,
-                n_recordings=n_recordings,
-                n_readouts=n_readouts,
-            )
-            for name, (n_right, bits) in table.items():
-                sys.stdout.write(f"  {name:<52} {n_right} right, {bits} bits\n")
+    for (n_sequences, n_recordings), n_chosen, base in itertools.product(
+        ((4_000, 100), (28_600, 400)), chosen, BASES
+    ):
+        sys.stdout.write(
+            f"{n_sequences:,} sequences, {n_recordings} recordings, {n_chosen} chosen, {n_readouts} "
+            f"readouts, file 0 {base.name}; always naming “large”: {SHARES[2] * n_chosen:.1f}\n"
+        )
+        table = measured(
+            n_chosen=n_chosen,
+            n_sequences=n_sequences,
+            n_recordings=n_recordings,
+            n_readouts=n_readouts,
+            base=base,
+        )
+        for name, (n_right, bits) in table.items():
+            sys.stdout.write(f"  {name:<52} {n_right} right, {bits} bits\n")
+        sys.stdout.flush()
 
 
 if __name__ == "__main__":

@@ -93,7 +93,7 @@ def test_every_value_gets_an_interval_and_a_rank_range_that_hold_what_is_publish
     for submission in inferred[:2]:
         score = scores_of(submission, edition)["mid"]
         low, high = plain_interval(submission, edition)
-        step = disclosure.step_of(high - low, decimals=1)
+        step = disclosure.step_of(high - low, decimals=1, least=edition.least_step)
         assert low - step - 0.006 <= score.low <= low + 0.006
         assert high - 0.006 <= score.high <= high + step + 0.006
 

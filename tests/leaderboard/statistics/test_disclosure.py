@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from django.db import transaction
 from django.test import Client
@@ -52,8 +53,36 @@ def test_ends_are_rounded_outwards_to_a_tenth_of_the_width(
         assert math.copysign(1, end) == 1 or end < 0
 
 
-def published(exact: Difference, shown: Difference, *, is_hidden: bool = True) -> Difference:
-    edition = Edition(split=Split(is_hidden=is_hidden), ground_truth_id="sha256:0", decimals=1)
+@pytest.mark.parametrize("width", [0.05, 0.3, 1.0, 1.99, 2.0, 7.3, 10.0, 49.9, 320.0])
+@pytest.mark.parametrize("middle", [-3.217, 0.013, 14.83, 812.4])
+def test_ends_are_never_finer_than_the_step_of_their_edition(width: float, middle: float) -> None:
+    low, high = middle - width / 2, middle + width / 2
+    ends = disclosure.coarse_ends(low, high, decimals=1, least=0.5)
+    step = disclosure.step_of(width, decimals=1, least=0.5)
+    assert step == max(0.5, disclosure.step_of(width, decimals=1))
+    assert low - step < ends[0] <= low + 1e-6
+    assert high - 1e-6 <= ends[1] < high + step
+    for end in ends:
+        assert end / 0.5 == pytest.approx(round(end / 0.5), abs=1e-6)
+
+
+def test_an_edition_has_a_step_and_an_earlier_one_keeps_its_own_ends() -> None:
+    lows, highs = np.array([13.61, np.nan]), np.array([14.48, np.nan])
+    split = Split(is_hidden=True)
+    now = Edition(split=split, ground_truth_id="sha256:0", decimals=1)
+    earlier = Edition(split=split, ground_truth_id="sha256:0", decimals=1, least_step=None)
+    for edition, ends in ((now, (13.5, 14.5)), (earlier, (13.6, 14.5))):
+        low, high = disclosure.published_ends(lows, highs, edition=edition)
+        assert (low[0], high[0]) == ends
+        assert np.isnan([low[1], high[1]]).all()
+
+
+def published(
+    exact: Difference, shown: Difference, *, is_hidden: bool = True, least_step: float | None = None
+) -> Difference:
+    edition = Edition(
+        split=Split(is_hidden=is_hidden), ground_truth_id="sha256:0", decimals=1, least_step=least_step
+    )
     return disclosure.published_difference(exact, shown, edition=edition)
 
 
@@ -77,7 +106,13 @@ def test_ends_of_a_difference_are_rounded_outwards_and_p_alone_judges_it(
     assert high <= public.high
     assert public.p is None
     assert public.is_significant == (p < 0.05)
-    assert published(exact, exact, is_hidden=False) == exact
+    assert published(exact, exact, is_hidden=False, least_step=0.5) == exact
+
+
+def test_a_narrow_interval_of_a_difference_has_the_step_of_its_edition() -> None:
+    exact = Difference(0.5, 0.4, 0.6, 0.0001)
+    public = published(exact, exact, least_step=0.5)
+    assert (public.low, public.high, public.is_significant) == (0.0, 1.0, True)
 
 
 def test_values_published_alike_are_not_significantly_different() -> None:
@@ -99,7 +134,7 @@ def test_nothing_finer_of_a_hidden_split_is_in_the_database(
     ask(entries[0], rival(1.07))
     builders.infer_all()
     for low, high in Score.objects.filter(low__isnull=False).values_list("low", "high"):
-        step = disclosure.step_of(0.8 * (high - low), decimals=1)
+        step = disclosure.step_of(0.8 * (high - low), decimals=1, least=edition.least_step)
         assert (low / step, high / step) == pytest.approx((round(low / step), round(high / step)), abs=1e-6)
     (row,) = Comparison.objects.all()
     for difference in row.differences.values():
