@@ -1,47 +1,53 @@
 """The outbox: keep what the mail server does not take, and send it later.
 
 Mails of accounts are tried at once; others wait for the workers' sweep or `manage.py send_mails`. Each is
-sent at least once: a crash between sending and saving sends it again.
+sent at least once: a crash between sending and saving sends it again. A mail that the server refuses for
+good ends, one that it puts off waits alone, and only a fault of the connection stops a run.
 """
 
-import smtplib
 from collections.abc import Callable
 from datetime import datetime, timedelta
-from typing import Final
+from typing import Any, Final
 
 import structlog
 from django.conf import settings
-from django.core.mail import EmailMessage
-from django.db.models import F
+from django.core.mail import EmailMessage, get_connection
+from django.db.models import F, QuerySet
 from django.urls import reverse
 
+from leaderboard.mails.delivery import FAULTS, Delivery, Outcome, deliver, no_connection
 from leaderboard.models import Mail, MailKind, User
 
 log = structlog.get_logger(__name__)
 
-# What a mail server that is away, or does not want a mail, raises.
-FAULTS: Final = (OSError, smtplib.SMTPException)
 MAX_AT_ONCE: Final = 50
 GIVE_UP_AFTER: Final = timedelta(days=3)
 _FIRST_WAIT: Final = timedelta(seconds=30)
 _LONGEST_WAIT: Final = timedelta(hours=1)
+# Connections that break while a mail is sent: after so many the server is taken to be away.
+_MAX_BROKEN: Final = 3
 # Kept so long to know what was told already.
 KEPT: Final = timedelta(days=30)
 
 
 def send_or_keep(*, message: EmailMessage, now: datetime) -> None:
-    """Send a mail to one person now, or keep it; never fails."""
-    if _sent(message):
+    """Send a mail to one person now, or keep it; never fails. What is refused for good is listed."""
+    delivery = deliver(message)
+    if delivery.outcome is Outcome.SENT:
         return
     [recipient] = message.to
-    Mail.objects.create(
+    mail = Mail.objects.create(
         kind=MailKind.ACCOUNT,
         recipient=recipient,
         subject=message.subject[:250],
         text=str(message.body),
         queued_at=now,
         due_at=now + _FIRST_WAIT,
+        n_tries=1,
+        reason=_kept_reason(delivery),
     )
+    if delivery.outcome is Outcome.REFUSED:
+        _end(mail, now=now, delivery=delivery)
 
 
 def notice(*, kind: MailKind, user: User, key: str, subject: str, text: str, now: datetime) -> Mail:
@@ -67,24 +73,77 @@ def waiting() -> int:
     return Mail.objects.filter(ended_at=None).count()
 
 
+def put_off() -> QuerySet[Mail]:
+    """Return the waiting mails that the server has put off, the oldest first."""
+    return Mail.objects.filter(ended_at=None).exclude(reason="").order_by("queued_at", "pk")
+
+
+def unsent() -> QuerySet[Mail]:
+    """Return the mails that were refused or given up, the newest first; `purge` deletes them."""
+    return Mail.objects.exclude(ended_at=None).filter(is_sent=False).order_by("-ended_at", "-pk")
+
+
 def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) -> int:
-    """Send what is due, oldest first, until one fails. Returns how many were sent."""
-    n_sent = 0
-    for mail in Mail.objects.filter(ended_at=None, due_at__lte=now).order_by("due_at")[:MAX_AT_ONCE]:
-        if is_stopping():
-            break
-        wait = min(_FIRST_WAIT * 2**mail.n_tries, _LONGEST_WAIT)
-        mine = Mail.objects.filter(pk=mail.pk, n_tries=mail.n_tries, ended_at=None)
-        if not mine.update(n_tries=F("n_tries") + 1, due_at=now + wait):
-            continue  # somebody else sends it
-        message = EmailMessage(mail.subject, mail.text, to=[mail.recipient], headers=_headers(mail))
-        is_sent = _sent(message)
-        n_sent += is_sent
-        if is_sent or mail.queued_at <= now - GIVE_UP_AFTER:
-            _end(mail, now=now, is_sent=is_sent)
-        if not is_sent:
-            break
+    """Send what is due, oldest first, until there is no connection. Returns how many were sent."""
+    n_sent = n_broken = 0
+    due = list(Mail.objects.filter(ended_at=None, due_at__lte=now).order_by("due_at")[:MAX_AT_ONCE])
+    connection = get_connection()
+    try:
+        for mail in due:
+            if is_stopping() or n_broken == _MAX_BROKEN:
+                break
+            try:
+                connection.open()
+            except FAULTS as fault:
+                _put_off_all(now=now, delivery=no_connection(fault))
+                break
+            if not _claimed(mail, now=now):
+                continue  # somebody else sends it
+            message = EmailMessage(mail.subject, mail.text, to=[mail.recipient], headers=_headers(mail))
+            delivery = deliver(message, connection=connection)
+            _note(mail, now=now, delivery=delivery)
+            n_sent += delivery.outcome is Outcome.SENT
+            # It may be this mail that the server breaks off at, so the next ones are tried as well.
+            n_broken += delivery.outcome is Outcome.NO_CONNECTION
+            if delivery.outcome is not Outcome.SENT:
+                _close(connection)
+                connection = get_connection()
+    finally:
+        _close(connection)
     return n_sent
+
+
+def _claimed(mail: Mail, *, now: datetime) -> bool:
+    wait = min(_FIRST_WAIT * 2 ** min(mail.n_tries, 10), _LONGEST_WAIT)
+    mine = Mail.objects.filter(pk=mail.pk, n_tries=mail.n_tries, ended_at=None)
+    return bool(mine.update(n_tries=F("n_tries") + 1, due_at=now + wait))
+
+
+def _note(mail: Mail, *, now: datetime, delivery: Delivery) -> None:
+    is_given_up = mail.queued_at <= now - GIVE_UP_AFTER
+    if is_given_up or delivery.outcome in {Outcome.SENT, Outcome.REFUSED}:
+        _end(mail, now=now, delivery=delivery)
+    else:
+        Mail.objects.filter(pk=mail.pk).update(reason=_kept_reason(delivery))
+
+
+def _kept_reason(delivery: Delivery) -> str:
+    # Empty while the mail waits for the server alone, which is what the age of the oldest tells.
+    return "" if delivery.outcome is Outcome.NO_CONNECTION else delivery.reason
+
+
+def _put_off_all(*, now: datetime, delivery: Delivery) -> None:
+    """Give up what has waited for days for a server that is away."""
+    log.warning("mail_server_away", reason=delivery.reason)
+    for mail in Mail.objects.filter(ended_at=None, due_at__lte=now, queued_at__lte=now - GIVE_UP_AFTER):
+        _end(mail, now=now, delivery=delivery)
+
+
+def _close(connection: Any) -> None:
+    try:
+        connection.close()
+    except FAULTS as fault:
+        log.info("mail_connection_lost", reason=type(fault).__name__)
 
 
 def purge(*, now: datetime) -> int:
@@ -102,18 +161,11 @@ def _headers(mail: Mail) -> dict[str, str]:
     }
 
 
-def _end(mail: Mail, *, now: datetime, is_sent: bool) -> None:
-    # Links in the text open accounts, and addresses are private.
-    ended = {"recipient": "", "subject": "", "text": "", "ended_at": now, "is_sent": is_sent}
-    Mail.objects.filter(pk=mail.pk).update(**ended)
-    if not is_sent:
-        log.error("mail_given_up", mail_id=mail.pk, kind=mail.kind, n_tries=mail.n_tries + 1)
-
-
-def _sent(message: EmailMessage) -> bool:
-    try:
-        message.send()
-    except FAULTS as fault:
-        log.warning("mail_not_sent", reason=f"{type(fault).__name__}: {fault}"[:200])
-        return False
-    return True
+def _end(mail: Mail, *, now: datetime, delivery: Delivery) -> None:
+    is_sent = delivery.outcome is Outcome.SENT
+    # Links in the text open accounts. An address to which nothing was sent is what maintainers ask for.
+    ended: dict[str, Any] = {"subject": "", "text": "", "ended_at": now, "is_sent": is_sent}
+    ended |= {"recipient": "", "reason": ""} if is_sent else {"reason": delivery.reason}
+    is_mine = Mail.objects.filter(pk=mail.pk, ended_at=None).update(**ended)
+    if is_mine and delivery.outcome in {Outcome.NO_CONNECTION, Outcome.PUT_OFF}:
+        log.error("mail_given_up", mail_id=mail.pk, kind=mail.kind, outcome=delivery.outcome.value)

@@ -19,7 +19,10 @@ class MailKind(models.TextChoices):
 
 
 class Mail(models.Model):
-    """A mail to one person. Once it is sent, its text and recipient are cleared."""
+    """A mail to one person. Once it is sent, its text and recipient are cleared.
+
+    One that was never sent keeps its recipient, and the reason, for `outbox.KEPT`.
+    """
 
     kind = models.CharField(max_length=16, choices=MailKind)
     user = models.ForeignKey(User, null=True, blank=True, on_delete=models.CASCADE, related_name="+")
@@ -37,6 +40,9 @@ class Mail(models.Model):
     n_tries = models.PositiveSmallIntegerField(default=0)
     ended_at = models.DateTimeField(null=True, blank=True, help_text="When it was sent or given up.")
     is_sent = models.BooleanField(default=False)
+    reason = models.CharField(
+        max_length=200, blank=True, help_text="What the mail server said when it did not take this mail."
+    )
 
     class Meta:
         indexes = [models.Index(fields=["due_at"], condition=Q(ended_at=None), name="mails_that_wait")]

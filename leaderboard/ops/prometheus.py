@@ -6,6 +6,7 @@ Figures of HTTP are a process's own; processes of one gunicorn share `PROMETHEUS
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from datetime import timedelta
 from functools import partial
 from typing import Any, Final
 
@@ -116,12 +117,29 @@ def _cleaning() -> Iterator[Metric]:
 
 
 def _mails() -> Iterator[Metric]:
-    waiting = Mail.objects.filter(ended_at=None).aggregate(n=Count("pk"), age=Now() - Min("queued_at"))
-    yield _gauge("tsttc_mails_waiting", "Mails that are not sent yet.", {(): waiting["n"]})
+    waiting = Mail.objects.filter(ended_at=None)
+    # What a server puts off for its recipient's sake says nothing of the others.
+    oldest = waiting.filter(reason="").aggregate(age=Now() - Min("queued_at"))["age"]
+    yield _gauge("tsttc_mails_waiting", "Mails that are not sent yet.", {(): waiting.count()})
+    yield _gauge(
+        "tsttc_mails_put_off",
+        "Those of them that the mail server puts off for their recipient's sake.",
+        {(): waiting.exclude(reason="").count()},
+    )
     yield _gauge(
         "tsttc_mails_oldest_age_seconds",
-        "How long the oldest of them waits; 0 if none does.",
-        {(): waiting["age"].total_seconds() if waiting["age"] else 0.0},
+        "How long the oldest of the others waits; 0 if none does.",
+        {(): oldest.total_seconds() if oldest else 0.0},
+    )
+    ended = Mail.objects.filter(ended_at__gte=Now() - timedelta(days=1))
+    yield _gauge(
+        "tsttc_mails_ended_last_day",
+        "Mails of the outbox that were sent in the last 24 hours, and those that were refused or discarded.",
+        {
+            ("sent",): ended.filter(is_sent=True).count(),
+            ("unsent",): ended.filter(is_sent=False).count(),
+        },
+        labels=["outcome"],
     )
 
 

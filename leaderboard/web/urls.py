@@ -12,6 +12,7 @@ from leaderboard.web.landing import crawler_views, landing_views
 from leaderboard.web.maintain import (
     audit_views,
     edited_page_views,
+    mail_views,
     maintainer_views,
     moderation_views,
     published_views,
@@ -118,6 +119,7 @@ urlpatterns = [
     path("maintain/", maintainer_views.hub, name="maintain"),
     path("maintain/pages/", edited_page_views.site_pages, name="maintain_pages"),
     path("maintain/pages/<page:page_name>/", edited_page_views.site_page, name="maintain_page"),
+    path("maintain/mails/", mail_views.mails, name="maintain_mails"),
     path("maintain/audit/", audit_views.events, name="maintain_audit"),
     path("maintain/audit/events.json", audit_views.export, name="maintain_audit_json"),
     path("maintain/queue/", queue_views.queue, name="maintain_queue"),

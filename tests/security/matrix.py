@@ -133,6 +133,7 @@ LINES: dict[str, Line] = {
     "maintain_pages": line(GET=KEEPERS),
     # Without a text there is nothing to save.
     "maintain_page": line(GET=KEEPERS, POST="in 404 404 404 422 in in", at={"page_name": "rules"}),
+    "maintain_mails": line(GET=KEEPERS),
     "maintain_audit": line(GET=KEEPERS),
     "maintain_audit_json": line(GET=KEEPERS),
     "maintain_queue": line(GET=KEEPERS),

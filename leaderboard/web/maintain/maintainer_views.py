@@ -17,6 +17,7 @@ from evaluator.tables.formats import csv_lines
 from leaderboard.editions import corrections, history, preview, splits
 from leaderboard.editions.preview import ABSENT
 from leaderboard.errors.refusals import NotMaintainer
+from leaderboard.mails import outbox
 from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, Team, User
 from leaderboard.pages import texts
 from leaderboard.web.boards import edition_tables, tables
@@ -80,6 +81,8 @@ def hub(request: HttpRequest) -> HttpResponse:
         "n_teams": Team.objects.count(),
         "n_published": splits.quoted().count(),
         "n_pages": len(texts.PAGES),
+        "n_mails_waiting": outbox.waiting(),
+        "n_mails_unsent": outbox.unsent().count(),
         "n_events": AuditEvent.objects.count(),
         "has_imprint": has_imprint,
     }

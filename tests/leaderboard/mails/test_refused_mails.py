@@ -1,0 +1,152 @@
+"""A refused recipient concerns one mail: all others are sent, and maintainers see which were not."""
+
+from collections.abc import Iterator
+from datetime import timedelta
+
+import pytest
+from django.core.mail import EmailMessage
+from django.test import Client
+from django.utils import timezone
+from pytest_django import Settings
+
+from leaderboard.mails import outbox
+from leaderboard.models import Mail, MailKind, User
+from tests.leaderboard.mails import smtp_server
+from tests.leaderboard.ops.test_prometheus import figures
+
+pytestmark = pytest.mark.django_db
+
+NOW = timezone.now()
+MINUTE, DAY = timedelta(minutes=1), timedelta(days=1)
+
+
+@pytest.fixture
+def server(settings: Settings) -> Iterator[smtp_server.Server]:
+    with smtp_server.running() as running:
+        settings.EMAIL_BACKEND = "django.core.mail.backends.smtp.EmailBackend"
+        settings.EMAIL_HOST, settings.EMAIL_PORT = "127.0.0.1", running.port
+        settings.EMAIL_USE_TLS, settings.EMAIL_USE_SSL = False, False
+        settings.EMAIL_HOST_USER = settings.EMAIL_HOST_PASSWORD = ""
+        yield running
+
+
+def queue(*recipients: str) -> None:
+    """Queue one mail for each, in this order."""
+    outbox.queue(
+        [
+            Mail(
+                kind=MailKind.ACCOUNT,
+                recipient=recipient,
+                subject="S",
+                text="secret link",
+                queued_at=NOW - MINUTE,
+                due_at=NOW - MINUTE + timedelta(milliseconds=number),
+            )
+            for number, recipient in enumerate(recipients)
+        ]
+    )
+
+
+def state_of(recipient: str) -> tuple[bool, str, str]:
+    """Whether a mail has ended, its text, and the reason."""
+    row = Mail.objects.get(recipient=recipient)
+    return row.ended_at is not None, row.text, row.reason
+
+
+@pytest.mark.parametrize(
+    "dead", ["gone@example.org", "spam@example.org", "a b\n@example.org", "ä" * 70 + "@exa..mple"]
+)
+def test_refused_recipients_end_their_mails_and_delay_no_other(server: smtp_server.Server, dead: str) -> None:
+    queue(*[dead] * 60, "first@example.org", "second@example.org")
+    # Even so many cannot fill more than one run.
+    assert sum(outbox.work_off(now=NOW) for _ in range(2)) == 2
+    assert server.taken == ["first@example.org", "second@example.org"]
+    assert outbox.waiting() == 0
+    for mail in outbox.unsent():
+        assert (mail.recipient, mail.subject, mail.text, mail.n_tries) == (dead, "", "", 1)
+        assert mail.reason
+    assert outbox.unsent().count() == 60
+
+
+@pytest.mark.parametrize(
+    ("slow", "answer"),
+    [("full@example.org", "452 4.2.2 Mailbox full"), ("later@x.org", "451 4.7.1 Greylisted")],
+)
+def test_a_mail_that_is_put_off_waits_alone_and_ends_after_three_days(
+    server: smtp_server.Server, slow: str, answer: str
+) -> None:
+    queue(slow, "first@example.org", "second@example.org")
+    assert outbox.work_off(now=NOW) == 2
+    assert state_of(slow) == (False, "secret link", answer)
+    assert outbox.work_off(now=NOW) == 0
+    assert server.asked.count(slow) == 1  # not tried again at once
+    for hours in range(1, 80):
+        outbox.work_off(now=NOW + timedelta(hours=hours))
+    assert state_of(slow) == (True, "", answer)
+    assert server.asked.count(slow) > 60
+
+
+@pytest.mark.parametrize("breaker", ["crash@example.org", "busy@example.org"])
+def test_a_mail_at_which_the_server_breaks_off_does_not_stop_the_run(
+    server: smtp_server.Server, breaker: str
+) -> None:
+    queue(breaker, breaker, "first@example.org", "second@example.org")
+    assert outbox.work_off(now=NOW) == 2
+    assert outbox.waiting() == 2
+
+
+def test_a_server_that_refuses_the_sender_loses_no_mail(server: smtp_server.Server) -> None:
+    queue("first@example.org", "second@example.org")
+    server.sender_answer = "553 5.7.1 Not your address"
+    assert outbox.work_off(now=NOW) == 0
+    assert outbox.waiting() == 2
+    server.sender_answer = "250 ok"
+    assert outbox.work_off(now=NOW + MINUTE) == 2
+
+
+def test_a_server_that_wants_a_log_in_loses_no_mail(server: smtp_server.Server) -> None:
+    queue(*[f"{number}@example.org" for number in range(10)])
+    server.sender_answer = "530 5.7.0 Authentication required"
+    assert outbox.work_off(now=NOW) == 0
+    assert outbox.waiting() == 10
+
+
+def test_only_mails_that_wait_for_the_server_alone_count_as_old(
+    server: smtp_server.Server, settings: Settings
+) -> None:
+    queue("gone@example.org", "full@example.org", "first@example.org")
+    Mail.objects.update(queued_at=NOW - 2 * DAY)
+    outbox.work_off(now=NOW)
+    metrics = figures()
+    assert metrics["tsttc_mails_oldest_age_seconds"] == 0
+    assert metrics["tsttc_mails_waiting"] == metrics["tsttc_mails_put_off"] == 1
+    assert metrics['tsttc_mails_ended_last_day{outcome="sent"}'] == 1
+    assert metrics['tsttc_mails_ended_last_day{outcome="unsent"}'] == 1
+    server.sender_answer = "530 5.7.0 Authentication required"
+    queue("other@example.org")
+    Mail.objects.update(queued_at=NOW - 2 * DAY)
+    outbox.work_off(now=NOW)
+    assert figures()["tsttc_mails_oldest_age_seconds"] > DAY.total_seconds()
+
+
+def test_a_mail_that_is_refused_during_a_request_is_listed_at_once(server: smtp_server.Server) -> None:
+    for recipient in ("gone@example.org", "full@example.org", "first@example.org"):
+        outbox.send_or_keep(message=EmailMessage("S", "secret link", to=[recipient]), now=NOW)
+    assert state_of("gone@example.org") == (True, "", "550 5.1.1 No such user")
+    assert state_of("full@example.org") == (False, "secret link", "452 4.2.2 Mailbox full")
+    assert server.taken == ["first@example.org"]
+
+
+def test_maintainers_see_which_mails_were_not_sent_and_why(
+    server: smtp_server.Server, client: Client, maintainer: User
+) -> None:
+    queue("gone@example.org", "full@example.org", "first@example.org")
+    outbox.work_off(now=NOW)
+    client.force_login(maintainer)
+    page = client.get("/maintain/mails/").text
+    assert "gone@example.org" in page
+    assert "550 5.1.1 No such user" in page
+    assert "452 4.2.2 Mailbox full" in page
+    assert "first@example.org" not in page
+    assert "secret link" not in page
+    assert "/maintain/mails/" in client.get("/maintain/").text
