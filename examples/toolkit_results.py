@@ -4,7 +4,7 @@
 
 FOLDER has the annotations (*.pkl) that the toolkit has read on this machine. It counts the sequences in the
 order in which the file system lists the files, which differs between machines; a manifest counts them over
-the sorted files. Without arguments the files of this folder are scored, whose anno_ids are the manifest's.
+the sorted files. Without arguments, predictions.json of this folder is scored, which has natural keys.
 """
 
 import sys

@@ -50,7 +50,6 @@ class SequenceFolder:
       missing box is NaN.
     - `boxes_from`: what the boxes were read from: "boxes.csv" or "annotation files".
     - `is_normalised`: true if boxes are parts of the image's width and height, false if they are pixels.
-    - `has_own_numbers`: true if the folder has no manifest. A board may then have other anno_ids.
     """
 
     path: Path
@@ -59,7 +58,6 @@ class SequenceFolder:
     boxes: NDArray[np.float64]
     boxes_from: str
     is_normalised: bool
-    has_own_numbers: bool = False
 
     @property
     def n_sequences(self) -> int:
@@ -186,15 +184,7 @@ def read_folder(path: str | os.PathLike[str]) -> SequenceFolder:
         missing = f"no {BOXES} and no" if given is not None else f"neither {MANIFEST} with {BOXES} nor"
         raise reject("unreadable", f"The folder has {missing} annotation files; {expected}.", path.name)
     manifest, boxes = annotated
-    return SequenceFolder(
-        path,
-        root,
-        manifest,
-        boxes,
-        "annotation files",
-        is_normalised=True,
-        has_own_numbers=given is None,
-    )
+    return SequenceFolder(path, root, manifest, boxes, "annotation files", is_normalised=True)
 
 
 def read_folder_truth(path: Path) -> GroundTruth:

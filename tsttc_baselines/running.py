@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from evaluator.counting import counted
 from evaluator.predictions.writing import write_predictions
 from evaluator.problems import Findings, Problem, reject
+from evaluator.truth.ground_truth import KeyKind
 from tsttc_baselines.folder_checks import require_complete, require_usable
 from tsttc_baselines.folders import SequenceFolder
 from tsttc_baselines.journals import Journal
@@ -75,6 +76,7 @@ def run_method(
     parameters: Mapping[str, Value],
     frame_gap: int,
     out: Path,
+    keys: KeyKind = "natural_key",
     n_processes: int = 1,
     strict: bool = False,
     progress: Progress = lambda _n_done: None,
@@ -87,6 +89,7 @@ def run_method(
     - `frame_gap`: the number of frames from the reference to the target, 1 to 5.
     - `out`: the file to write. While the run lasts, its state is in a file beside it that ends in `.part`;
       after an interruption, the same call continues.
+    - `keys`: the kind of keys of the file. The dataset's toolkit reads "anno_id" only.
     - `n_processes`: the number of processes.
     - `strict`: if true, a fallback raises `Rejected` and no file is written.
     - `progress`: is called with the number of finished sequences, at least every second.
@@ -120,7 +123,9 @@ def run_method(
             _require_no_fallback(in_order)
         _require_estimates(in_order)
         seconds = journal.seconds + time.perf_counter() - began_s
-        done = _done(folder, method, used, frame_gap, in_order, n_resumed=n_resumed, seconds=seconds)
+        done = _done(
+            folder, method, used, frame_gap, in_order, keys=keys, n_resumed=n_resumed, seconds=seconds
+        )
         _write_whole(out, done.data)
         journal.discard()
     return done
@@ -133,6 +138,7 @@ def _done(
     frame_gap: int,
     outcomes: list[Outcome],
     *,
+    keys: KeyKind,
     n_resumed: int,
     seconds: float,
 ) -> Run:
@@ -153,8 +159,9 @@ def _done(
         **weights,
         **_code(method),
     }
-    keys = folder.manifest.natural_keys if folder.has_own_numbers else folder.manifest.anno_id_keys
-    data = write_predictions(keys=keys, scale_ratio=scale_ratio, frame_gap=frame_gap, meta=meta)
+    data = write_predictions(
+        manifest=folder.manifest, keys=keys, scale_ratio=scale_ratio, frame_gap=frame_gap, meta=meta
+    )
     return Run(scale_ratio, n_fallback, examples, n_resumed, seconds, meta, data)
 
 

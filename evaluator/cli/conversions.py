@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from evaluator.cli.options import default_option, output_option, predictions_argument
-from evaluator.cli.reading import FOLDER, naming, predictions_of, write_bytes
+from evaluator.cli.reading import FOLDER, TABLE, naming, predictions_of, write_bytes
+
+if TYPE_CHECKING:
+    from evaluator import Manifest
 
 GAP = click.IntRange(1, 5)
 
@@ -28,6 +31,20 @@ GAP = click.IntRange(1, 5)
     metavar="FOLDER",
     help="Write natural keys; the anno_ids are those of the toolkit for this folder on this machine.",
 )
+@click.option(
+    "--manifest",
+    "manifest_path",
+    type=TABLE,
+    metavar="FILE",
+    help="Write natural keys; the anno_ids are those of this manifest, for which the file was made.",
+)
+@click.option(
+    "--to-manifest",
+    "to_manifest_path",
+    type=TABLE,
+    metavar="FILE",
+    help="Leave out the sequences that this manifest lacks.",
+)
 @output_option("the file")
 def convert(
     *,
@@ -36,6 +53,8 @@ def convert(
     to: Literal["ttc", "scale_ratio"],
     to_frame_gap: int | None,
     annotations: Path | None,
+    manifest_path: Path | None,
+    to_manifest_path: Path | None,
     output: Path | None,
 ) -> None:
     """Convert PREDICTIONS, a prediction file or - for standard input, to another unit, rate, or kind of keys.
@@ -47,9 +66,13 @@ def convert(
     differs between machines. --annotations gives a result file of the toolkit natural keys, which mean the
     same everywhere. Run the command on the machine and the folder on which the toolkit ran.
 
+    A new edition can give an anno_id to another sequence. --manifest gives a file of an earlier edition
+    natural keys. --to-manifest leaves out the sequences that the new edition lacks.
+
     \b
     Examples:
       tsttc convert results.json --annotations annotations/val/ -o predictions.json
+      tsttc convert old.json --manifest old.csv --to-manifest new.csv -o predictions.json
       tsttc convert ratios.json --frame-gap 1 -o predictions.json
       tsttc convert predictions.json --to scale_ratio --to-frame-gap 3 -o ratios.json
     """
@@ -57,6 +80,8 @@ def convert(
 
     if to == "ttc" and to_frame_gap is not None:
         raise click.UsageError("Seconds have no rate: --to-frame-gap belongs to --to scale_ratio.")
+    if annotations is not None and manifest_path is not None:
+        raise click.UsageError("Give either --annotations or --manifest: the source of the file's anno_ids.")
     natural_keys = None
     if annotations is not None:
         from evaluator.truth.numbering import read_numbering  # noqa: PLC0415 -- loads numpy
@@ -72,6 +97,8 @@ def convert(
                 frame_gap=frame_gap,
                 to_frame_gap=to_frame_gap,
                 natural_keys=natural_keys,
+                manifest=_manifest(manifest_path),
+                to_manifest=_manifest(to_manifest_path),
             )
         except ValueError as fault:
             raise click.UsageError(str(fault)) from None
@@ -80,4 +107,16 @@ def convert(
         return
     write_bytes(output, encoded)
     unit = "seconds" if to == "ttc" else "scale ratios"
-    click.echo(f"{output}: {unit}{' by natural key' if natural_keys is not None else ''}.")
+    is_natural = annotations is not None or manifest_path is not None
+    keys = " by natural key" if is_natural else ""
+    only = f", only for the sequences of {to_manifest_path}" if to_manifest_path else ""
+    click.echo(f"{output}: {unit}{keys}{only}.")
+
+
+def _manifest(path: Path | None) -> Manifest | None:
+    from evaluator import read_manifest  # noqa: PLC0415 -- loads numpy
+
+    if path is None:
+        return None
+    with naming(path):
+        return read_manifest(path)

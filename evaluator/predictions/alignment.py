@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Literal, TypeGuard
+from typing import TypeGuard
 
 import numpy as np
 
@@ -14,9 +14,8 @@ from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap, scale_ratio_to
 from evaluator.predictions.documents import Document, Members, Unit, kind_of, parse, read_document
 from evaluator.predictions.values import RULES, allowed, broken_rule
 from evaluator.problems import Findings, listed, pointer, quoted, reject
-from evaluator.truth.ground_truth import Manifest
+from evaluator.truth.ground_truth import KeyKind, Manifest
 
-KeyKind = Literal["anno_id", "natural_key"]
 PointerOf = Callable[[str], str]
 """The JSON pointer to the member of a name."""
 Fault = Callable[[object], tuple[str, str] | None]
@@ -42,7 +41,7 @@ def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
     values = _column(document.predictions, manifest, findings, document.pointer, fault_of(document.unit))
     if document.unit == "scale_ratio":
         fps_hz = read_rates(document, manifest, findings)
-        names = manifest.natural_keys if keys == "natural_key" else manifest.anno_id_keys
+        names = manifest.keys_of(keys)
         ratios, values = values, scale_ratio_to_ttc(values, fps_hz=fps_hz)
         # NaN stands where the ratio or its rate has a fault of its own.
         for row in np.flatnonzero(~(allowed(values, unit="ttc") | np.isnan(values))).tolist():
@@ -119,8 +118,7 @@ def _check_keys(members: Members, manifest: Manifest, findings: Findings, pointe
     given = {by_id[name] for name in id_names} | {by_natural_key[name] for name in natural_names}
     n_missing = manifest.n_sequences - len(given)
     if n_missing:
-        every = manifest.natural_keys if kind == "natural_key" else manifest.anno_id_keys
-        missing = [name for row, name in enumerate(every) if row not in given]
+        missing = [name for row, name in enumerate(manifest.keys_of(kind)) if row not in given]
         message = (
             f"{_n(n_missing, 'sequence has', 'sequences have')} no value: {listed(missing)}; "
             f"expected one for each of the manifest's {manifest.n_sequences:,} sequences, by {noun}."

@@ -24,11 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
-from evaluator.predictions.alignment import Aligned, KeyKind, read_rates
+from evaluator.predictions.alignment import Aligned, read_rates
 from evaluator.predictions.documents import BYTE_ORDER_MARK, Document, Members, parse, read_document
 from evaluator.predictions.values import allowed
 from evaluator.problems import Findings, Rejected
-from evaluator.truth.ground_truth import Manifest
+from evaluator.truth.ground_truth import KeyKind, Manifest
 
 Words = NDArray[np.uint64]
 Rows = NDArray[np.intp]
@@ -213,7 +213,7 @@ def _by_object(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None
     # A natural key has slashes, an anno_id has none.
     is_natural = "/" in next(iter(members))
     kind: KeyKind = "natural_key" if is_natural else "anno_id"
-    if tuple(members) == (manifest.natural_keys if is_natural else manifest.anno_id_keys):
+    if tuple(members) == manifest.keys_of(kind):
         return values, kind
     row_of = manifest.row_of_natural_key if is_natural else manifest.row_of_id
     rows = np.fromiter(map(row_of.get, members, repeat(-1)), dtype=np.intp, count=n)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,7 +30,8 @@ from evaluator.predictions.loading import json_of
 from evaluator.predictions.parquet import as_sent
 from evaluator.predictions.values import broken_rule
 from evaluator.predictions.writing import write_predictions
-from evaluator.problems import Findings, listed, quoted
+from evaluator.problems import Findings, listed, quoted, reject
+from evaluator.truth.ground_truth import Manifest
 
 
 def convert(
@@ -41,22 +43,27 @@ def convert(
     to_fps_hz: float | None = None,
     to_frame_gap: int | None = None,
     natural_keys: Mapping[str, str] | None = None,
+    manifest: Manifest | None = None,
+    to_manifest: Manifest | None = None,
 ) -> bytes:
     """Convert a prediction file to the unit `to`.
 
     A flat file has seconds, or scale ratios at `fps_hz` or `frame_gap`; an envelope states its unit. Scale
-    ratios are written at `to_fps_hz` or `to_frame_gap`, by default 2 Hz (gap 5). With
-    `natural_keys`, natural keys by anno_id, the keys become natural keys; otherwise they stay. Raises
-    `Rejected` for a file with faults or with other anno_ids than `natural_keys`, and `ValueError` for an
-    impossible rate or more than one.
+    ratios are written at `to_fps_hz` or `to_frame_gap`, by default 2 Hz (gap 5).
+
+    With `manifest`, for which the file was made, anno_ids become natural keys; with `natural_keys`, natural
+    keys by anno_id, those of the toolkit do. Otherwise keys stay. `to_manifest` leaves out the sequences
+    that it does not have. Raises `Rejected` for a file with faults or with other anno_ids, `ValueError` for
+    an impossible rate, or more than one rate or source of keys.
     """
+    keys = _keys(natural_keys, manifest)
     document = read_document(parse(json_of(as_sent(data_of(source)))))
     _require_one_rate(document, fps_hz, frame_gap)
     findings = Findings()
     names = [name for name, _ in document.predictions]
     require_once(names, findings, document.pointer)
-    if natural_keys is not None:
-        _require_anno_ids(names, natural_keys, findings, document.pointer)
+    if keys is not None:
+        _require_anno_ids(names, keys, findings, document.pointer)
     is_ratio = document.unit == "scale_ratio" or fps_hz is not None or frame_gap is not None
     fault = fault_of("scale_ratio" if is_ratio else "ttc")
     values = column(document.predictions, range(len(names)), findings, document.pointer, fault, n=len(names))
@@ -68,8 +75,11 @@ def convert(
     findings.raise_if_any()
     ttc_s = values if rates is None else scale_ratio_to_ttc(values, fps_hz=rates)
     meta = document.meta
-    if natural_keys is not None:
-        names = [natural_keys[name] for name in names]
+    if keys is not None:
+        names = [keys.natural_keys[name] for name in names]
+    if to_manifest is not None:
+        kept = _kept(names, to_manifest, document.pointer)
+        names, ttc_s = [names[row] for row in kept], ttc_s[kept]
     if to == "ttc":
         return write_predictions(keys=names, ttc_s=ttc_s, meta=meta)
     if to_fps_hz is None and to_frame_gap is None:
@@ -118,37 +128,81 @@ def _gap(frame_gap: int | None) -> int:
     return frame_gap
 
 
-def _require_anno_ids(
-    names: list[str], natural_keys: Mapping[str, str], findings: Findings, pointer_of: PointerOf
-) -> None:
+@dataclass(frozen=True, slots=True)
+class _Keys:
+    """Natural keys by anno_id, and the words for where they come from."""
+
+    natural_keys: Mapping[str, str]
+    source: str
+    owner: str
+    expected: str
+
+
+def _keys(natural_keys: Mapping[str, str] | None, manifest: Manifest | None) -> _Keys | None:
+    if manifest is None:
+        if natural_keys is None:
+            return None
+        return _Keys(natural_keys, "folder", "toolkit", "from the folder that the toolkit has read")
+    if natural_keys is not None:
+        raise ValueError("Give either manifest or natural_keys.")
+    of_manifest = dict(zip(manifest.anno_id_keys, manifest.natural_keys, strict=True))
+    return _Keys(of_manifest, "manifest", "manifest", "and the manifest for which the file was made")
+
+
+def _kept(names: list[str], manifest: Manifest, pointer_of: PointerOf) -> list[int]:
+    """Return the rows whose natural key the manifest has; raises `Rejected` where there is none."""
+    kept = [row for row, name in enumerate(names) if name in manifest.row_of_natural_key]
+    if not kept:
+        message = (
+            f"None of the {len(names):,} keys is a natural key of the manifest, such as "
+            f"{quoted(manifest.natural_keys[0])}; expected natural keys, or also the manifest for which the "
+            "file was made."
+        )
+        raise reject("unknown-keys", message, pointer_of(names[0]) if names else "")
+    return kept
+
+
+def _require_anno_ids(names: list[str], keys: _Keys, findings: Findings, pointer_of: PointerOf) -> None:
+    natural_keys = keys.natural_keys
     if names and set(natural_keys.values()).issuperset(names):
         message = (
-            f"The {len(names):,} keys are natural keys already; expected anno_ids of the toolkit. "
-            "The file needs no annotations: it can be sent as it is."
+            f"The {len(names):,} keys are natural keys already; expected anno_ids of the {keys.owner}. "
+            "The file needs no conversion of its keys."
         )
         findings.group("unknown-keys", message, pointer_of(names[0]), n_faults=len(names))
         return
     given = set(names)
-    n_in_folder = counted(len(natural_keys), "sequence")
-    counts = f"The file has {counted(len(given), 'anno_id')} and the folder {n_in_folder}"
+    n_there = counted(len(natural_keys), "sequence")
+    counts = f"The file has {counted(len(given), 'anno_id')} and the {keys.source} {n_there}"
     unknown = [name for name in given if name not in natural_keys]
     missing = [key for key in natural_keys if key not in given]
     if unknown:
-        expected = f"expected the anno_ids 0 to {len(natural_keys) - 1}"
+        ends = [min(natural_keys, key=int), max(natural_keys, key=int)]
+        expected = f"expected the anno_ids {' to '.join(ends)}"
         shown = listed([quoted(name) for name in sorted(unknown)])
         message = f"{counts}; no sequence for {len(unknown):,} of the anno_ids: {shown}; {expected}."
         findings.group("unknown-keys", message, pointer_of(min(unknown)), n_faults=len(unknown))
     if missing:
         message = (
             f"{counts}; no value for {len(missing):,} of the sequences: {listed(missing)}; "
-            "expected one for each, from the folder that the toolkit has read."
+            f"expected one for each, {keys.expected}."
         )
         findings.group("missing-keys", message, pointer_of(missing[0]), n_faults=len(missing))
 
 
 def _rates(document: Document, names: list[str], findings: Findings) -> Floats:
+    row_of = {name: row for row, name in enumerate(names)}
+
     def by_key(members: Members, pointer_of: PointerOf, fault: Fault) -> Floats:
         given = dict(members)
+        require_once([key for key, _ in members], findings, pointer_of)
+        unknown = [key for key in given if key not in row_of]
+        if unknown:
+            message = (
+                f"{len(unknown):,} keys of {document.rate_name} have no prediction: "
+                f"{listed([quoted(key) for key in unknown])}; expected a rate for each prediction alone."
+            )
+            findings.group("unknown-keys", message, pointer_of(unknown[0]), n_faults=len(unknown))
         missing = [key for key in names if key not in given]
         if missing:
             message = (
@@ -156,7 +210,6 @@ def _rates(document: Document, names: list[str], findings: Findings) -> Floats:
                 "expected one for each prediction."
             )
             findings.group("missing-keys", message, pointer_of(missing[0]), n_faults=len(missing))
-        row_of = {name: row for row, name in enumerate(names)}
         rows = [row_of.get(key) for key, _ in members]
         return column(members, rows, findings, pointer_of, fault, n=len(names))
 

@@ -21,13 +21,13 @@ from evaluator.arguments import Source, data_of, require
 from evaluator.arrays import as_floats, in_row_order
 from evaluator.counting import counted, file_size
 from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
-from evaluator.predictions.alignment import KeyKind, read_slowly
+from evaluator.predictions.alignment import read_slowly
 from evaluator.predictions.columns import read_column
 from evaluator.predictions.documents import Unit
 from evaluator.predictions.parquet import as_sent
 from evaluator.predictions.writing import rate_of, require_values
 from evaluator.problems import pointer, quoted, reject
-from evaluator.truth.ground_truth import Manifest
+from evaluator.truth.ground_truth import KeyKind, Manifest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,8 +118,7 @@ class Predictions:
 
     def where(self, row: int) -> str:
         """Return the JSON pointer to the value of sequence `row`."""
-        ours = self.manifest.anno_id_keys if self.keys == "anno_id" else self.manifest.natural_keys
-        names = ours if self.names is None else self.names
+        names = self.manifest.keys_of(self.keys) if self.names is None else self.names
         return pointer("predictions", names[row]) if self.enveloped else pointer(names[row])
 
 

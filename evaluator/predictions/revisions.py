@@ -57,7 +57,7 @@ def realigned(predictions: Predictions, *, manifest: Manifest) -> Predictions:
         raise absent(missing, manifest=manifest)
     ttc_s = predictions.ttc_s[rows]
     ttc_s.setflags(write=False)
-    names = own.natural_keys if predictions.keys == "natural_key" else own.anno_id_keys
+    names = own.keys_of(predictions.keys)
     sent = tuple([names[row] for row in rows.tolist()])
     return replace(predictions, manifest=manifest, ttc_s=ttc_s, names=sent)
 

@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,14 +18,14 @@ from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap
 from evaluator.predictions.documents import Unit, parse, read_document
 from evaluator.predictions.values import allowed, broken_rule
 from evaluator.problems import Findings, pointer, quoted
-from evaluator.truth.ground_truth import Manifest
+from evaluator.truth.ground_truth import KeyKind, Manifest
 
 
 def write_predictions(
     path: str | os.PathLike[str] | IO[bytes] | None = None,
     *,
     manifest: Manifest | None = None,
-    keys: Sequence[str | int] | None = None,
+    keys: Sequence[str | int] | KeyKind | None = None,
     ttc_s: ArrayLike | None = None,
     scale_ratio: ArrayLike | None = None,
     fps_hz: float | None = None,
@@ -35,7 +35,10 @@ def write_predictions(
     """Write a valid prediction file; returns its bytes, and writes them to `path` or an open file if given.
 
     The values are an array `(n,)`: `ttc_s` in seconds, or `scale_ratio` with `fps_hz` or `frame_gap`. They
-    have the order of `manifest`, or of `keys` if you have no manifest. Every float64 reads back exactly.
+    have the order of `manifest`, or of `keys`, a list, if you have no manifest. With a manifest the file has
+    natural keys, which mean the same in every edition; `keys="anno_id"` writes the numbers that the dataset's
+    toolkit reads. Every float64 reads back exactly.
+
     Seconds without `meta` are written in the flat form, anything else as an envelope. Raises `ValueError` for
     a wrong combination of arguments, `Rejected` for values that no file may hold.
     """
@@ -59,8 +62,8 @@ def write_predictions(
 
 
 def template(manifest: Manifest) -> bytes:
-    """Write a file to fill in: `null`, which is refused, for every anno_id of the manifest."""
-    members = ",\n".join(f'"{name}": null' for name in manifest.anno_id_keys)
+    """Write a file to fill in: `null`, which is refused, for every sequence, by natural key."""
+    members = ",\n".join(f"{json.dumps(name)}: null" for name in manifest.keys_of())
     return f"{{\n{members}\n}}\n".encode()
 
 
@@ -74,12 +77,22 @@ def _values(ttc_s: ArrayLike | None, scale_ratio: ArrayLike | None, manifest: Ma
     return values
 
 
-def _names(manifest: Manifest | None, keys: Sequence[str | int] | None, *, n_values: int) -> Sequence[str]:
-    if (manifest is None) == (keys is None):
+def _names(
+    manifest: Manifest | None, keys: Sequence[str | int] | KeyKind | None, *, n_values: int
+) -> Sequence[str]:
+    if isinstance(keys, str):
+        if manifest is None or keys not in get_args(KeyKind):
+            message = (
+                f'keys is {quoted(keys)}; expected "natural_key" or "anno_id" with a manifest, or a list'
+            )
+            raise ValueError(f"{message} of keys without one.")
+    elif (manifest is None) == (keys is None):
         raise ValueError("Give either manifest or keys.")
     if manifest is not None:
         require(manifest, Manifest, name="manifest")
-    names = manifest.anno_id_keys if manifest is not None else tuple(map(str, () if keys is None else keys))
+        names = manifest.keys_of("anno_id" if keys == "anno_id" else "natural_key")
+    else:
+        names = tuple(map(str, () if keys is None else keys))
     if len(names) != n_values:
         raise ValueError(f"Found {counted(n_values, 'value')} for {counted(len(names), 'sequence')}.")
     if len(set(names)) != len(names):

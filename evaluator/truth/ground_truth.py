@@ -15,7 +15,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any, Literal, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +30,7 @@ from evaluator.truth.objects import OBJECT_COLUMNS, Objects
 from evaluator.units import Units, units_of
 
 Integers = NDArray[np.int64]
+KeyKind = Literal["anno_id", "natural_key"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +98,10 @@ class Manifest:
     def anno_id_keys(self) -> tuple[str, ...]:
         """The anno_ids as keys of a prediction file."""
         return tuple(map(str, self.anno_id.tolist()))
+
+    def keys_of(self, kind: KeyKind = "natural_key") -> tuple[str, ...]:
+        """The keys of a prediction file by row: natural keys, which mean the same in every edition."""
+        return self.natural_keys if kind == "natural_key" else self.anno_id_keys
 
     @cached_property
     def rows_by_id(self) -> NDArray[np.intp] | slice:

@@ -19,9 +19,9 @@ from django.conf import settings
 
 from evaluator import Manifest, Predictions, Rejected, system_calls
 from evaluator.limits import EXIT_OUT_OF_MEMORY, READY
-from evaluator.predictions.alignment import KeyKind
 from evaluator.predictions.documents import Unit
 from evaluator.predictions.values import allowed
+from evaluator.truth.ground_truth import KeyKind
 from leaderboard.sandbox import fork_server
 from leaderboard.sandbox.fork_server import Answer
 

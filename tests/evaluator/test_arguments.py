@@ -190,7 +190,9 @@ def test_tensors_are_taken_in_bfloat16_and_with_a_gradient(tensor: Callable[[obj
         assert Predictions.from_arrays(ttc_s=given, manifest=manifest).ttc_s.tolist() == values
         predictions = Predictions.from_arrays(scale_ratio=given, frame_gap=5, manifest=manifest)
         assert predictions.ttc_s.tolist() == ttc_s
-        assert evaluator.write_predictions(ttc_s=given, manifest=manifest) == b'{"0":0.5,"1":0.75}'
+        assert evaluator.write_predictions(ttc_s=given, manifest=manifest, keys="anno_id") == (
+            b'{"0":0.5,"1":0.75}'
+        )
         assert evaluator.scale_ratio_to_ttc(given, fps_hz=2).tolist() == ttc_s
         assert evaluator.ttc_to_scale_ratio([4.0, 8.0], fps_hz=given).shape == (2,)
         assert evaluator.convert_rate(given, from_fps_hz=2, to_fps_hz=2).tolist() == values

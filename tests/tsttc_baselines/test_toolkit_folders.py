@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from evaluator import Manifest, Rejected, read_manifest, read_predictions
+from evaluator.truth.ground_truth import KeyKind
 from tests.evaluator.toolkit_folders import START_NS, STEP_NS, camera, foreign_class, write_folder
 from tests.tsttc_baselines.made_folders import GREY_LEVELS, SIZE, box, picture, write_image
 from tsttc_baselines.folders import read_folder
@@ -46,10 +47,12 @@ def test_boxes_and_frames_are_those_of_the_annotation_files(tmp_path: Path, as_a
     assert np.abs(clip.colour(0).astype(int) - picture(0, 6)).mean() < 4
 
 
-def run_on(folder: Path) -> bytes:
+def run_on(folder: Path, *, keys: KeyKind = "natural_key") -> bytes:
     """The file of a run over this folder."""
     out = folder / "p.json"
-    done = run_method(folder=read_folder(folder), method=GREY_LEVELS, parameters={}, frame_gap=5, out=out)
+    done = run_method(
+        folder=read_folder(folder), method=GREY_LEVELS, parameters={}, frame_gap=5, out=out, keys=keys
+    )
     assert done.n_fallback == {}
     return out.read_bytes()
 
@@ -66,10 +69,14 @@ def test_a_run_over_a_download_is_a_file_for_any_manifest_of_its_sequences(tmp_p
     )
 
 
-def test_a_manifest_beside_the_files_gives_the_file_its_anno_ids(tmp_path: Path) -> None:
+def test_a_manifest_beside_the_files_gives_the_order_and_the_anno_ids_that_are_asked_for(
+    tmp_path: Path,
+) -> None:
     folder = download(tmp_path)
-    write_renumbered(folder, read_manifest(folder))
-    assert list(json.loads(run_on(folder))["predictions"]) == ["50", "40"]
+    own = read_manifest(folder)
+    write_renumbered(folder, own)
+    assert list(json.loads(run_on(folder))["predictions"]) == list(own.natural_keys)[::-1]
+    assert list(json.loads(run_on(folder, keys="anno_id"))["predictions"]) == ["50", "40"]
 
 
 def write_renumbered(folder: Path, own: Manifest) -> None:

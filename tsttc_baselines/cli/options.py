@@ -28,6 +28,15 @@ def gap_option(command: Command) -> Command:
     )(command)
 
 
+def keys_option(command: Command) -> Command:
+    return default_option(
+        "--keys",
+        type=click.Choice(["natural", "anno-id"]),
+        default="natural",
+        help="Keys of the file: natural keys, valid in every edition, or anno_ids for the toolkit.",
+    )(command)
+
+
 def jobs_option(command: Command) -> Command:
     return click.option(
         "--jobs",

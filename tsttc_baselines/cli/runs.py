@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -16,7 +16,7 @@ from evaluator.cli.options import json_option
 from evaluator.cli.reading import FOLDER, naming
 from evaluator.counting import counted
 from tsttc_baselines.cli import require_opencv
-from tsttc_baselines.cli.options import gap_option, jobs_option, out_option, require_writable
+from tsttc_baselines.cli.options import gap_option, jobs_option, keys_option, out_option, require_writable
 from tsttc_baselines.methods import METHODS, Method, Parameter, Value
 from tsttc_baselines.own_methods import MethodMissing, find_method, is_own, line_of
 
@@ -80,6 +80,7 @@ def _whole(end: float | None) -> int | None:
 @click.option(
     "--set", "settings", multiple=True, metavar="NAME=VALUE", help="A parameter of a method of yours."
 )
+@keys_option
 @jobs_option
 @click.option("--strict", is_flag=True, help="Write nothing and exit 1 where a sequence needs a fallback.")
 @json_option
@@ -89,6 +90,7 @@ def run(
     folder: Path,
     out: Path,
     frame_gap: int,
+    keys: Literal["natural", "anno-id"],
     n_processes: int,
     strict: bool,
     as_json: bool,
@@ -128,6 +130,7 @@ def run(
                     parameters=given,
                     frame_gap=frame_gap,
                     out=out,
+                    keys="anno_id" if keys == "anno-id" else "natural_key",
                     n_processes=n_processes,
                     strict=strict,
                     progress=progress,

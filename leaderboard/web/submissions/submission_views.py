@@ -71,11 +71,11 @@ def _taken(request: HttpRequest, taken: Submission) -> HttpResponse:
 
 @require_safe
 def template(request: HttpRequest, split: str) -> HttpResponseBase:
-    """Answer a file with all anno_ids of the split and no value, to be filled in."""
+    """Answer a file with the natural keys of all sequences and no value, to be filled in."""
     edition = split_or_404(request, split).current_edition
     if edition is None:
         raise Http404
-    tag = f'"template-{edition.ground_truth.manifest_digest}"'
+    tag = f'"natural-template-{edition.ground_truth.manifest_digest}"'
     if is_known(request, tag):
         return HttpResponseNotModified(headers={"ETag": tag})
     return HttpResponse(

@@ -80,7 +80,8 @@ def test_rejection_names_the_table_when_the_table_is_at_fault(tsttc: Tsttc, tmp_
 
 def test_prediction_that_the_toolkit_cannot_score_is_the_file_s_fault(tsttc: Tsttc, tmp_path: Path) -> None:
     predictions = tmp_path / "near-zero.json"
-    predictions.write_text(json.dumps(json.loads(GOOD.read_text()) | {"0": -0.05}))
+    values = json.loads(GOOD.read_text())
+    predictions.write_text(json.dumps(values | {next(iter(values)): -0.05}))
     result = tsttc("score", predictions, "--truth", TRUTH, "--protocol", "toolkit")
     assert result.exit_code == 1
     assert str(predictions) in result.stderr

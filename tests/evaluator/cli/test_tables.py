@@ -74,7 +74,18 @@ def test_rate_of_each_key_is_its_own() -> None:
         ('{"a": 0.9, "a": 0.8}', {"duplicate-keys"}),
         ('{"unit": "scale_ratio", "fps": 2, "predictions": {"a": -1}}', {"not-positive"}),
         ('{"unit": "scale_ratio", "frame_gap": {"a": 6}, "predictions": {"a": 1}}', {"bad-rate"}),
-        ('{"unit": "scale_ratio", "frame_gap": {"b": 1}, "predictions": {"a": 1}}', {"missing-keys"}),
+        (
+            '{"unit": "scale_ratio", "frame_gap": {"b": 1}, "predictions": {"a": 1}}',
+            {"missing-keys", "unknown-keys"},
+        ),
+        (
+            '{"unit": "scale_ratio", "fps": {"a": 2, "b": 2, "a": 10}, "predictions": {"a": 0.8, "b": 1}}',
+            {"duplicate-keys"},
+        ),
+        (
+            '{"unit": "scale_ratio", "frame_gap": {"a": 1, "b": 5}, "predictions": {"a": 0.8}}',
+            {"unknown-keys"},
+        ),
         ('{"unit": "scale_ratio", "fps": "2", "predictions": {"a": 1}}', {"bad-rate"}),
         ('{"a": 0}', {"zero"}),
         ("[]", {"wrong-top-level"}),

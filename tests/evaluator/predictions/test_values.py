@@ -23,7 +23,7 @@ WAYS: dict[str, Callable[[], object]] = {
     "reading ratios": lambda: read_predictions(
         envelope({**RATIOS, "1": NEAR}, unit="scale_ratio", fps=2), manifest=MANIFEST
     ),
-    "writing": lambda: write_predictions(manifest=MANIFEST, ttc_s=[4.0, NEAR, 1.0]),
+    "writing": lambda: write_predictions(keys=["0", "1", "2"], ttc_s=[4.0, NEAR, 1.0]),
     "conversion": lambda: convert(flat({"0": 4, "1": NEAR, "2": 1}), to="scale_ratio"),
     "conversion of ratios": lambda: convert(envelope({**RATIOS, "1": NEAR}, unit="scale_ratio", fps=2)),
     "scoring": lambda: evaluate(

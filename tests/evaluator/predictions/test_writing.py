@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from evaluator import Manifest, Rejected, read_predictions, write_predictions
 from evaluator.metrics.scale import scale_ratio_to_ttc
+from evaluator.predictions.writing import template
 from tests.evaluator.worlds import make_truth
 
 MANIFEST = make_truth([4.0, -10.0, 1.0], anno_ids=[7, 0, 12]).manifest
@@ -21,10 +22,31 @@ def read(data: bytes, manifest: Manifest = MANIFEST) -> list[float]:
     return list(read_predictions(data, manifest=manifest).ttc_s.tolist())
 
 
-def test_seconds_are_written_in_the_toolkits_form() -> None:
+def test_a_manifest_gives_a_file_natural_keys() -> None:
     data = write_predictions(manifest=MANIFEST, ttc_s=np.array(TTC_S))
+    assert json.loads(data) == dict(zip(MANIFEST.natural_keys, TTC_S, strict=True))
+    assert write_predictions(manifest=MANIFEST, ttc_s=TTC_S, keys="natural_key") == data
+    assert read(data) == TTC_S
+
+
+def test_a_file_of_the_first_edition_says_the_same_of_a_renumbered_one() -> None:
+    data = write_predictions(manifest=MANIFEST, ttc_s=TTC_S)
+    table = MANIFEST.to_table()
+    table.anno_id = [0, 12, 7]
+    renumbered = Manifest.from_table(table)
+    assert read(data, renumbered) == TTC_S
+    by_number = write_predictions(manifest=MANIFEST, ttc_s=TTC_S, keys="anno_id")
+    assert read(by_number, renumbered) != TTC_S
+
+
+def test_the_toolkits_form_is_written_if_it_is_asked_for() -> None:
+    data = write_predictions(manifest=MANIFEST, ttc_s=np.array(TTC_S), keys="anno_id")
     assert json.loads(data) == {"7": 5.31, "0": -12.9, "12": 0.84}
     assert read(data) == TTC_S
+
+
+def test_the_template_has_natural_keys() -> None:
+    assert json.loads(template(MANIFEST)) == dict.fromkeys(MANIFEST.natural_keys)
 
 
 @pytest.mark.parametrize("rate", [{"fps_hz": 2.5}, {"frame_gap": 4}])
@@ -73,7 +95,7 @@ def test_every_value_reads_back_exactly(values: list[float]) -> None:
 )
 def test_values_that_no_file_may_hold_are_refused(arguments: dict[str, Any], code: str, message: str) -> None:
     with pytest.raises(Rejected) as rejected:
-        write_predictions(manifest=MANIFEST, **arguments)
+        write_predictions(manifest=MANIFEST, keys="anno_id", **arguments)
     assert [(p.code, p.message, p.where) for p in rejected.value.problems] == [(code, message, "/0")]
 
 
@@ -90,6 +112,8 @@ def test_notes_that_no_file_may_hold_are_refused() -> None:
         ({"ttc_s": TTC_S, "scale_ratio": TTC_S}, "Give either ttc_s or scale_ratio"),
         ({"ttc_s": TTC_S, "keys": ["0", "1", "2"]}, "Give either manifest or keys"),
         ({"ttc_s": TTC_S, "manifest": None}, "Give either manifest or keys"),
+        ({"ttc_s": TTC_S, "keys": "natural"}, 'keys is "natural"; expected "natural_key" or "anno_id"'),
+        ({"ttc_s": TTC_S, "manifest": None, "keys": "anno_id"}, "with a manifest"),
         ({"ttc_s": [1.0]}, "Found 1 value for 3 sequences"),
         ({"ttc_s": [TTC_S]}, r"shape \(1, 3\); expected \(n,\)"),
         ({"ttc_s": TTC_S, "manifest": None, "keys": ["0", "0", "1"]}, "not distinct"),

@@ -130,5 +130,5 @@ def test_natural_keys_are_not_converted_again(folder: Path, results: Path) -> No
     once = convert(results.read_bytes(), natural_keys=read_numbering(folder).natural_keys)
     assert messages(once, folder) == [
         "unknown-keys: The 327 keys are natural keys already; expected anno_ids of the toolkit. The file "
-        "needs no annotations: it can be sent as it is."
+        "needs no conversion of its keys."
     ]

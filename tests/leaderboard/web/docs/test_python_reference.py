@@ -6,11 +6,11 @@ from typing import Final, get_args
 
 import evaluator
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, ProtocolName
-from evaluator.predictions.alignment import KeyKind
 from evaluator.predictions.documents import Unit
 from evaluator.scoring.breakdown import GroupName
 from evaluator.scoring.differences import N_SIGN_FLIPS, PUBLISHED_DECIMALS
 from evaluator.scoring.significance import P_CLASSES
+from evaluator.truth.ground_truth import KeyKind
 from evaluator.units import UnitKind
 from leaderboard.web.docs import guides, python_reference
 

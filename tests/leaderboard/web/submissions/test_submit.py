@@ -130,13 +130,13 @@ def test_with_every_split_closed_there_is_no_form(signed_in: Client, edition: Ed
     assert "/board/test/" in [a.attributes["href"] for a in main.all("a")]
 
 
-def test_the_template_has_every_anno_id_and_is_rejected_until_it_is_filled_in(
+def test_the_template_has_every_natural_key_and_is_rejected_until_it_is_filled_in(
     client: Client, signed_in: Client, edition: Edition
 ) -> None:
     answer = client.get("/submit/template/test.json")
     manifest = manifests.load(edition.ground_truth.manifest_digest)
     template = json.loads(answer.content)
-    assert list(template) == list(manifest.anno_id_keys)
+    assert list(template) == list(manifest.natural_keys)
     assert set(template.values()) == {None}
     with pytest.raises(evaluator.Rejected) as rejected:
         evaluator.read_predictions(answer.content, manifest=manifest)
