@@ -340,12 +340,13 @@ API_RATES: dict[str, str | None] = {
     "revoke": "10/min",
     "refused": "60/min",
 }
-# What somebody sends on pages, pages that a process draws anew for one address, as of a time apart, and
-# comparisons (up to ten pairs each) that nobody has asked for before, on pages or in the API.
+# What somebody sends on pages, pages that a process draws anew for one address, as of a time and searches
+# apart, and comparisons (up to ten pairs each) that nobody has asked for before, on pages or in the API.
 PAGE_RATES: dict[str, str | None] = {
     "send": "60/min",
     "draw": "300/min",
     "as_of": "30/min",
+    "search": "30/min",
     "compare": "12/min",
 }
 if TESTING or not env.bool("TSTTC_THROTTLES", default=True):

@@ -12,6 +12,8 @@ from leaderboard.web.docs import guides, python_reference
 from leaderboard.web.markdown import Part
 
 MAX_QUERY: Final = 100
+# Each word is looked for in every part of every guide.
+MAX_WORDS: Final = 8
 MAX_HITS: Final = 12
 _MAX_COUNT: Final = 8
 _SNIPPET: Final = 200
@@ -44,11 +46,17 @@ class Hit(NamedTuple):
 
 
 def find(query: str) -> list[Hit]:
-    """Return at most `MAX_HITS` parts, those of one guide together; parts with some words if none has all."""
-    typed = set(_ASKED.findall(query.lower()))
-    words = sorted(typed - _FILLERS or typed)
+    """Return at most `MAX_HITS` parts, those of one guide together; parts with some words if none has all.
+
+    The first `MAX_WORDS` words count, those with hyphens by their parts; words of one letter do not.
+    """
+    words = _words(query)
+    if not words:
+        return []
     asked = [_pattern(word) for word in words]
     exact = [_pattern(word, is_exact=True) for word in words]
+    # Most parts have none of the words, which is cheap to see.
+    beginnings = [re.split("[-_]", _ENDING.sub("", word))[0] for word in words]
     ranked = []
     for name in guides.files():
         guide = guides.guide(name)
@@ -57,6 +65,9 @@ def find(query: str) -> list[Hit]:
         for part in guide.parts:
             heading, text = part.heading, " ".join(part.text.split())
             own = f"{heading.text} {text}"
+            folded = own.lower()
+            if not any(beginning in folded for beginning in beginnings):
+                continue
             everything = f"{guide.title} {own}"
             counts = [len(word.findall(everything)) for word in asked]
             if any(word.search(own) for word in asked):
@@ -64,17 +75,38 @@ def find(query: str) -> list[Hit]:
                 score = _score(heading.text, guide.title, asked) - 4 * (name in _REFERENCES)
                 score += sum(min(count, _MAX_COUNT) for count in counts)
                 rank = (counts.count(0), n_beginnings, is_background, -score)
-                anchor = f"#{heading.anchor}" if heading.level > 1 else ""
-                address = reverse("guide", args=[name]) + anchor
-                snippet = _snippet(part, asked)
-                ranked.append((rank, Hit(guide.title, heading.text if anchor else "", address, snippet)))
+                ranked.append((rank, name, part))
     apart = " ".join(_WORD.findall(query))
     if not ranked and apart != query:
         return find(apart)
     has_all = [each for each in ranked if each[0][0] == 0]
-    hits = [hit for _, hit in sorted(has_all or ranked, key=lambda each: each[0])[:MAX_HITS]]
+    best = sorted(has_all or ranked, key=lambda each: each[0])[:MAX_HITS]
+    hits = [_hit(name, part, asked) for _, name, part in best]
     titles = [hit.title for hit in hits]
     return sorted(hits, key=lambda hit: titles.index(hit.title))
+
+
+def _hit(name: str, part: Part, asked: list[re.Pattern[str]]) -> Hit:
+    anchor = f"#{part.heading.anchor}" if part.heading.level > 1 else ""
+    address = reverse("guide", args=[name]) + anchor
+    heading = part.heading.text if anchor else ""
+    return Hit(guides.guide(name).title, heading, address, _snippet(part, asked))
+
+
+def _words(query: str) -> list[str]:
+    typed: list[str] = []
+    for name in _ASKED.findall(query.lower()):
+        parts = _WORD.findall(name)
+        long_ones = [part for part in parts if len(part) > 1]
+        typed += [name] if long_ones and len(parts) <= MAX_WORDS else long_ones
+    words: set[str] = set()
+    n_parts = 0
+    for word in [word for word in typed if word not in _FILLERS] or typed:
+        n_parts += len(_WORD.findall(word))
+        if n_parts > MAX_WORDS:
+            break
+        words.add(word)
+    return sorted(words)
 
 
 def _score(heading: str, title: str, asked: list[re.Pattern[str]]) -> float:

@@ -8,6 +8,7 @@ from django.conf import settings
 from django.core.cache import cache
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import render
+from django.urls import reverse
 
 from leaderboard.errors import problem_codes
 from leaderboard.ops import rate_limits
@@ -59,6 +60,16 @@ class AsOfPageThrottle(rate_limits.Throttle):
         return super().identity(request) if "at" in request.GET else None
 
 
+class SearchThrottle(rate_limits.Throttle):
+    """Searches in the guides, for one address: each reads all of them."""
+
+    rates, scope = "PAGE_RATES", "search"
+
+    def identity(self, request: HttpRequest) -> object | None:
+        is_search = request.path == reverse("docs_search") and request.GET.get("q")
+        return super().identity(request) if is_search else None
+
+
 class RateLimitMiddleware:
     """Answers 429 to too many requests; cached answers are not counted."""
 
@@ -71,7 +82,8 @@ class RateLimitMiddleware:
     def __call__(self, request: HttpRequest) -> HttpResponse:
         if not request.path.startswith(self.ELSEWHERE):
             is_reading = request.method in {"GET", "HEAD"}
-            for throttle in (AsOfPageThrottle(), PageThrottle()) if is_reading else (FormThrottle(),):
+            reading = (AsOfPageThrottle(), SearchThrottle(), PageThrottle())
+            for throttle in reading if is_reading else (FormThrottle(),):
                 if not throttle.allow_request(request):
                     return _too_many(request, wait_s=throttle.wait_s)
         return self.get_response(request)

@@ -185,6 +185,15 @@ def test_where_no_part_has_all_words_those_with_some_are_shown() -> None:
     assert search.find("xyzzyq") == []
 
 
+def test_the_first_eight_words_of_a_search_count_however_they_are_joined() -> None:
+    names = [f"quota{n}" for n in range(search.MAX_WORDS)]
+    for joint in (" ", "-", "_"):
+        assert search.find(joint.join([*names, "edition", "board"])) == search.find(" ".join(names)) == []
+    assert search.find("edition " + " ".join(names)) != []
+    # Each word of a search is looked for in every part: this one would be 43 words, and then 43 again.
+    assert search.find("-".join("abcdefghijklmnopqrstuvwxyz")) == search.find("a b c") == []
+
+
 def test_a_page_of_several_sections_lists_them_and_each_link_has_its_heading(
     client: Client, benchmark: None
 ) -> None:

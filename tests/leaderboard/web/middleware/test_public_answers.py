@@ -140,13 +140,38 @@ def test_nothing_is_repeated_to_who_says_who_they_are(
     for _ in range(2):
         anybodys = client.get("/board/test/")
     assert is_kept(client, "/board/test/")
-    for headers in ({"Authorization": "Bearer nothing"}, {"HX-Request": "true"}):
-        assert not is_kept(client, "/board/test/", headers=headers)
+    assert client.get(API, headers={"Authorization": "Bearer nothing"}).status_code == 401
     client.force_login(owner)
     own = client.get("/board/test/")
     assert own["Cache-Control"] == "private, no-store"
     assert own.content != anybodys.content
     assert Client().get("/board/test/").content == anybodys.content
+
+
+@pytest.mark.parametrize("page", ["/", "/board/test/", "/board/test/?sort=-mid", "/compare/"])
+def test_nobody_goes_round_what_is_kept_with_a_made_up_cookie_or_header(
+    filled: list[Method], client: Client, page: str
+) -> None:
+    kept = client.get(page).content
+    for cookie in ("sessionid=made-up", "messages=made-up", "messages=W10:1abc:signature"):
+        answer = client.get(page, headers={"Cookie": cookie})
+        assert answer.content == kept
+        assert is_kept(client, page, headers={"Cookie": cookie})
+    for header in ({"Authorization": "Basic bWFkZTp1cA=="}, {"HX-Request": "true"}):
+        assert is_kept(client, page, headers=header)
+    # One that it could be is looked up, and nothing more.
+    with CaptureQueriesContext(connection) as asked:
+        answer = client.get(page, headers={"Cookie": f"sessionid={'a' * 32}"})
+    assert (len(asked), answer.content) == (2, kept)
+    assert answer["Cache-Control"] == "private, no-store"
+
+
+def test_a_message_that_waits_is_shown_to_its_reader_alone(filled: list[Method], client: Client) -> None:
+    kept = client.get("/board/test/").content
+    client.post("/submit/", {})
+    assert client.cookies["messages"].value
+    assert b"Your session has ended" in client.get("/board/test/").content
+    assert Client().get("/board/test/").content == kept
 
 
 def test_answers_to_queries_push_out_no_plain_page(

@@ -18,7 +18,8 @@ def rates(settings: Settings, benchmark: None) -> None:
     """Three of everything, counted from nothing: the next comes after longer than any test takes."""
     cache.clear()
     rate_limits.IN_PROCESS.clear()
-    settings.PAGE_RATES = settings.PAGE_RATES | {"send": "3/hour", "draw": "3/hour", "as_of": "1/hour"}
+    rates = {"send": "3/hour", "draw": "3/hour", "as_of": "1/hour", "search": "2/hour"}
+    settings.PAGE_RATES = settings.PAGE_RATES | rates
 
 
 def signed_in(user: User) -> Client:
@@ -83,6 +84,15 @@ def test_boards_as_of_a_time_have_a_rate_of_their_own_unless_answered_from_memor
     assert visitor.get("/board/test/?q=1").status_code == 200
     assert [Client(REMOTE_ADDR=ELSEWHERE).get(day).status_code for _ in range(3)] == [200] * 3
     assert visitor.get(day).status_code == 200
+
+
+def test_searches_have_a_rate_of_their_own_and_the_empty_page_does_not_count() -> None:
+    visitor = Client(REMOTE_ADDR=ATTACKER)
+    assert visitor.get("/docs/search/").status_code == 200
+    assert visitor.get("/docs/search/?q=").status_code == 200
+    rate_limits.IN_PROCESS.clear()
+    assert [visitor.get(f"/docs/search/?q=quota{n}").status_code for n in range(3)] == [200, 200, 429]
+    assert Client(REMOTE_ADDR=ELSEWHERE).get("/docs/search/?q=quota").status_code == 200
 
 
 def test_monitoring_and_the_api_are_not_counted_as_pages(owner: User) -> None:
