@@ -69,7 +69,7 @@ def exception_handler(exc: Exception, context: dict[str, Any]) -> Response | Non
 
 
 def _outage(exc: Exception) -> Response | None:
-    outage = outages.outage_of(exc)
+    outage = outages.answered(exc)
     if outage is None:
         return None
     return problem(status=outage.status, code=outage.code, detail=outage.sentence, headers=outage.headers)

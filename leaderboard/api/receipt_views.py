@@ -2,7 +2,7 @@
 
 from typing import cast
 
-from django.http import FileResponse, Http404, HttpResponse, HttpResponseBase, HttpResponseNotModified
+from django.http import FileResponse, HttpResponse, HttpResponseBase, HttpResponseNotModified
 from django.shortcuts import get_object_or_404
 from drf_spectacular.utils import OpenApiParameter, extend_schema
 from rest_framework.request import Request
@@ -45,14 +45,11 @@ class FileView(APIView):
     def get(self, request: Request, submission_id: str) -> HttpResponseBase:
         """The bytes as your team sent them. Another team's file returns 404, even for maintainers."""
         submission = _own(request, submission_id)
-        name = files.predictions_name(submission.digest)
-        if not files.store().exists(name):
-            raise Http404
         tag = {"ETag": f'"{submission.digest}"'}
         if is_known(request._request, tag["ETag"]):
             return HttpResponseNotModified(headers=tag)
         return FileResponse(
-            files.store().open(name, "rb"),
+            files.open_named(files.predictions_name(submission.digest)),
             as_attachment=True,
             filename=submission.filename or "predictions.json",
             content_type="application/octet-stream",

@@ -96,7 +96,7 @@ class ManifestView(APIView):
         if is_known(request._request, tag["ETag"]):
             return HttpResponseNotModified(headers=tag)
         return FileResponse(
-            files.store().open(files.manifest_name(digest), "rb"),
+            files.open_named(files.manifest_name(digest)),
             as_attachment=True,
             filename=f"tsttc-{row.pk}-manifest.csv",
             content_type="text/csv",

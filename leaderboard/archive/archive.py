@@ -66,7 +66,7 @@ def _board(split: Split, edition: Edition | None, written: dict[str, bytes]) -> 
         written[name] = each.write(export).encode() if each.write else answer
     if edition is not None:
         links["Manifest"] = files.manifest_name(edition.ground_truth.manifest_digest)
-        with files.store().open(links["Manifest"], "rb") as file:
+        with files.open_named(links["Manifest"]) as file:
             written[links["Manifest"]] = file.read()
     export = tables.export(board, address=address, has_intervals=True)
     shown, rows = [entry for entry in board.entries if entry.withdrawn_at is None], []

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import structlog
 from django.db import InterfaceError, OperationalError
 
-from leaderboard.storage.files import StoreUnavailable
+from leaderboard.storage.files import FULL, StoreUnavailable
 
 log = structlog.get_logger(__name__)
 
-FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
+# What a disk says that is read-only, broken, or of another owner; also that of unfinished uploads.
+BROKEN = frozenset({errno.EIO, errno.ESTALE, errno.EROFS, errno.EACCES, errno.EPERM})
 POSTGRESQL_DISK_FULL = "53100"
 
 
@@ -57,15 +58,22 @@ STORAGE_FULL = Outage(
 
 def outage_of(fault: BaseException | None) -> Outage | None:
     """Return the outage that a fault is a sign of, if any."""
-    outage = None
     if isinstance(fault, OperationalError | InterfaceError):
         # The driver's own exception, which knows PostgreSQL's code.
         is_full = getattr(fault.__cause__, "sqlstate", None) == POSTGRESQL_DISK_FULL
-        outage = STORAGE_FULL if is_full else DATABASE_AWAY
-    elif isinstance(fault, StoreUnavailable):
-        outage = STORE_AWAY
-    elif isinstance(fault, OSError) and fault.errno in FULL:
-        outage = STORAGE_FULL
+        return STORAGE_FULL if is_full else DATABASE_AWAY
+    if isinstance(fault, StoreUnavailable):
+        return STORE_AWAY
+    if isinstance(fault, OSError) and fault.errno in FULL:
+        return STORAGE_FULL
+    if isinstance(fault, OSError) and fault.errno in BROKEN:
+        return STORE_AWAY
+    return None
+
+
+def answered(fault: BaseException | None) -> Outage | None:
+    """Return the outage that a fault is a sign of, and log it, since it becomes an answer."""
+    outage = outage_of(fault)
     if outage is not None:
         log.error("outage", code=outage.code, reason=f"{type(fault).__name__}: {fault}"[:300])
     return outage

@@ -32,7 +32,8 @@ _COLUMNS: Final = {
 def document(edition: Edition) -> dict[str, Any]:
     """Describe the manifest of a published edition as a dataset with one table. Raises `OSError`."""
     split, benchmark, paper = edition.split, settings.BENCHMARK, settings.BENCHMARK.paper
-    with files.store().open(files.manifest_name(edition.ground_truth.manifest_digest), "rb") as file:
+    name = files.manifest_name(edition.ground_truth.manifest_digest)
+    with files.answering(), files.open_named(name) as file:
         columns = file.readline().decode().rstrip("\n").split(",")
         file.seek(0)
         # Not the digest of the manifest, which is of its rows in the order of anno_id.

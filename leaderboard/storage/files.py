@@ -1,5 +1,6 @@
 """The file store, through Django's storages: every file is named by its digest and never changes."""
 
+import errno
 import hashlib
 import os
 import tempfile
@@ -29,8 +30,29 @@ FRESH = timedelta(hours=12)
 """Younger files are nobody's to clean up; see `storage.orphans`, which waits for twice as long."""
 
 
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
+
+
 class StoreUnavailable(OSError):
     """The store does not answer, or refuses us. Another try later may help."""
+
+
+@contextmanager
+def answering(*, may_lack: bool = True) -> Iterator[None]:
+    """Raise `StoreUnavailable` for every error but a full disk and, with `may_lack`, an absent file.
+
+    A disk that is read-only, broken, away or of another owner has many errors, and the answer is one.
+    """
+    try:
+        yield
+    except StoreUnavailable:
+        raise
+    except OSError as fault:
+        if fault.errno in FULL or (may_lack and isinstance(fault, FileNotFoundError)):
+            raise
+        # Without the path: whoever asks need not know where the store is.
+        reason = f"the file store does not work ({fault.strerror or type(fault).__name__})"
+        raise StoreUnavailable(fault.errno or errno.EIO, reason) from fault
 
 
 class Rebuildable(ContentFile):
@@ -47,6 +69,7 @@ class DurableFileSystemStorage(FileSystemStorage):
         # Equal names hold equal bytes.
         return name
 
+    @answering()
     def exists(self, name: str) -> bool:
         # The file must still be there after a power cut.
         is_there = super().exists(name)
@@ -55,6 +78,7 @@ class DurableFileSystemStorage(FileSystemStorage):
             self._settle(Path(self.path(name)))
         return is_there
 
+    @answering(may_lack=False)
     def _save(self, name: str, content: "File[bytes]") -> str:
         target = Path(self.path(name))
         incoming = Path(self.location) / INCOMING
@@ -77,6 +101,33 @@ class DurableFileSystemStorage(FileSystemStorage):
             self._settle(target)
         return name
 
+    @answering()
+    def _open(self, name: str, mode: str = "rb") -> "File[bytes]":
+        opened = super()._open(name, mode)
+        try:
+            # A broken disk says so at the first read, when an answer may have begun already.
+            os.pread(opened.fileno(), 1, 0)
+        except BaseException:
+            opened.close()
+            raise
+        return opened
+
+    @answering()
+    def delete(self, name: str) -> None:
+        super().delete(name)
+
+    @answering()
+    def listdir(self, path: str) -> tuple[list[str], list[str]]:
+        return super().listdir(path)
+
+    @answering()
+    def size(self, name: str) -> int:
+        return super().size(name)
+
+    @answering()
+    def get_modified_time(self, name: str) -> datetime:
+        return super().get_modified_time(name)
+
     def _settle(self, target: Path) -> None:
         """Flush the directories above a file: a rename is durable no sooner."""
         root = Path(self.location)
@@ -89,6 +140,7 @@ class DurableFileSystemStorage(FileSystemStorage):
             if directory == root:
                 return
 
+    @answering()
     def delete_if_older(self, name: str, than: datetime) -> bool:
         """Remove a file unless it was written after `than`. Returns whether it was removed."""
         target = Path(self.path(name))
@@ -141,6 +193,14 @@ def replacing(target: Path) -> Iterator[Path]:
 
 def store() -> Storage:
     return storages["files"]
+
+
+def open_named(name: str) -> "File[bytes]":
+    """Open a file that a row names. Raises `OSError`, `StoreUnavailable` also if the store lacks it."""
+    try:
+        return store().open(name, "rb")
+    except FileNotFoundError as fault:
+        raise StoreUnavailable(errno.ENOENT, "the file store lacks a file that it should have") from fault
 
 
 def predictions_name(digest: str) -> str:
@@ -241,5 +301,5 @@ def save_manifest(manifest: Manifest) -> None:
 @contextmanager
 def opened_predictions(digest: str) -> Iterator[IO[bytes]]:
     """Open a prediction file with a file descriptor. Raises `OSError`."""
-    with store().open(predictions_name(digest), "rb") as kept:
+    with open_named(predictions_name(digest)) as kept:
         yield kept

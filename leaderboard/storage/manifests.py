@@ -1,5 +1,6 @@
 """Former manifests, kept by workers in the form that the reading process takes."""
 
+import errno
 import tempfile
 from functools import lru_cache
 from pathlib import Path
@@ -29,14 +30,16 @@ def load(digest: str) -> Manifest:
 
 def _stored(digest: str) -> Manifest:
     with tempfile.NamedTemporaryFile(suffix=".csv") as local:
-        with files.store().open(files.manifest_name(digest), "rb") as kept:
+        with files.answering(), files.open_named(files.manifest_name(digest)) as kept:
             local.write(kept.read())
         local.flush()
         try:
             manifest = read_manifest(local.name)
         except Rejected as fault:
             # Whoever sent a file is never to blame for it.
-            raise OSError(f"the manifest {digest} in the file store cannot be read: {fault}") from fault
+            reason = f"the manifest {digest} in the file store cannot be read: {fault}"
+            raise files.StoreUnavailable(errno.EIO, reason) from fault
     if manifest.digest != digest:
-        raise OSError(f"the manifest {digest} in the file store has another content: {manifest.digest}")
+        reason = f"the manifest {digest} in the file store has another content: {manifest.digest}"
+        raise files.StoreUnavailable(errno.EIO, reason)
     return manifest

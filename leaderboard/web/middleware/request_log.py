@@ -1,13 +1,16 @@
 """Logging of requests: one line each, with an id that the response carries as well."""
 
 import re
+import sys
 import time
+from typing import Any
 
 import structlog
 from django.http import HttpRequest, HttpResponse
 from django.utils.functional import SimpleLazyObject
 from django_structlog.middlewares import RequestMiddleware
 
+from leaderboard.errors import outages
 from leaderboard.ops import prometheus
 from leaderboard.web.middleware import monitoring_host
 
@@ -30,6 +33,11 @@ class RequestLogMiddleware(RequestMiddleware):
             structlog.contextvars.clear_contextvars()
             return
         super().handle_response(request, response)
+
+    def process_got_request_exception(self, sender: Any, request: HttpRequest, **kwargs: Any) -> None:
+        # An outage has a line of its own, and a traceback through our code says nothing more.
+        if outages.outage_of(sys.exception()) is None:
+            super().process_got_request_exception(sender, request, **kwargs)
 
     @staticmethod
     def format_request(request: HttpRequest) -> str:

@@ -7,12 +7,16 @@ from typing import Any
 from django.core.files.uploadedfile import UploadedFile
 from django.core.files.uploadhandler import FileUploadHandler, TemporaryFileUploadHandler
 
+from leaderboard.storage import files
+
 
 class UnnamedFileUploadHandler(TemporaryFileUploadHandler):
     # Frees its room at once if the disk is full.
     def new_file(self, *args: Any, **kwargs: Any) -> None:
         FileUploadHandler.new_file(self, *args, **kwargs)
-        file = tempfile.TemporaryFile()  # noqa: SIM115 - the request closes it, or else this handler
+        # Python says that a folder for unfinished files is not found when none can be written to.
+        with files.answering(may_lack=False):
+            file = tempfile.TemporaryFile()  # noqa: SIM115 - the request closes it, or else this handler
         self.file = UploadedFile(  # type: ignore[assignment]  # Django's has a name
             file, self.file_name, self.content_type, 0, self.charset, self.content_type_extra
         )

@@ -111,7 +111,7 @@ def test_file_that_the_store_has_lost_is_not_blamed(edition: Edition, owner: Use
     files.store().delete(files.predictions_name(submission.digest))
     assert run_next()
     assert strikes(submission) == (0, 1)
-    assert "FileNotFoundError" in evaluation_of(submission).last_error
+    assert "the file store lacks a file" in evaluation_of(submission).last_error
 
 
 def test_damaged_ground_truth_does_not_count_against_the_file(edition: Edition, owner: User) -> None:
