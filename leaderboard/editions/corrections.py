@@ -18,7 +18,6 @@ from leaderboard.db import clock
 from leaderboard.editions import ground_truth
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Edition, Evaluation, GroundTruth, Publication, Split, Status, Submission, User
-from leaderboard.models.submissions import SubmissionQuerySet
 from leaderboard.queue import lifecycle
 
 
@@ -58,7 +57,8 @@ def open_edition(
     """Open an edition next to the published one and queue every active submission for it.
 
     The ground truth is read from `path`, or is the imported one of that `digest`; it and the protocol stay
-    unless given. A second call with the same input queues nothing twice. `actor` None is the command line.
+    unless given. A former edition is opened again: it then gets new submissions too, until it is published or
+    discarded. A second call with the same input queues nothing twice. `actor` None is the command line.
     Raises `NotMaintainer`, `Refused`, or `evaluator.Rejected`.
     """
     require_maintainer(actor, to="change editions")
@@ -89,7 +89,11 @@ def open_edition(
                 f"{edition} has this ground truth, protocol and number of decimals ({split.decimals}), "
                 "and is the current board already.",
             )
-        queue_active(edition)
+        elif edition.published_at and edition.reopened_at is None:
+            edition.reopened_at = now
+            edition.save(update_fields=["reopened_at"])
+            audit.record_of(edition, "reopened", actor=actor, details={"edition": str(edition)})
+        ground_truth.queue_missing(edition)
     return edition
 
 
@@ -104,24 +108,6 @@ def _imported(split: Split, digest: str | None) -> GroundTruth:
             f"The split {split.pk!r} has no ground truth {digest[:80]!r}; import it with --truth first.",
         )
     return row
-
-
-def active_submissions(edition: Edition) -> SubmissionQuerySet:
-    """Return the active submissions of an edition's split, oldest first."""
-    rows = Submission.objects.active().filter(split=edition.split_id)
-    return rows.select_related("method__team").order_by("submitted_at")
-
-
-def queue_active(edition: Edition) -> int:
-    """Queue every active submission that this edition has no evaluation of. Returns their number.
-
-    The caller has locked the split's row, so no new submission is missed.
-    """
-    missing = list(
-        active_submissions(edition).exclude(evaluations__edition=edition).values_list("pk", flat=True)
-    )
-    lifecycle.enqueue_many(submission_ids=missing, edition=edition)
-    return len(missing)
 
 
 def progress(edition: Edition) -> RescoringProgress:
@@ -141,8 +127,8 @@ def progress(edition: Edition) -> RescoringProgress:
     )
     first = counts.pop("first")
     so_far = RescoringProgress(**counts, rate_per_s=None, left_s=None)
-    # The files of a board come over weeks: their rate says nothing.
-    if not edition.is_in_preparation or first is None or not so_far.n_done or not so_far.n_waiting:
+    # The files of a board, also of a former one, come over weeks: their rate says nothing.
+    if not edition.is_draft or first is None or not so_far.n_done or not so_far.n_waiting:
         return so_far
     rate_per_s = so_far.n_done / max((clock.database_now() - first).total_seconds(), 0.001)
     return replace(so_far, rate_per_s=rate_per_s, left_s=so_far.n_waiting / rate_per_s)
@@ -151,7 +137,7 @@ def progress(edition: Edition) -> RescoringProgress:
 def unfinished(edition: Edition) -> list[Submission]:
     """Return active submissions of the split that this edition has neither scored nor rejected."""
     done = Evaluation.objects.filter(edition=edition, status__in=[Status.SCORED, Status.REJECTED])
-    return list(active_submissions(edition).exclude(pk__in=done.values("submission")))
+    return list(ground_truth.active_submissions(edition).exclude(pk__in=done.values("submission")))
 
 
 def newly_rejected(edition: Edition) -> list[Submission]:
@@ -159,7 +145,7 @@ def newly_rejected(edition: Edition) -> list[Submission]:
     here = Evaluation.objects.filter(edition=edition, status=Status.REJECTED)
     board = Evaluation.objects.filter(edition=edition.split.current_edition_id, status=Status.SCORED)
     return list(
-        active_submissions(edition)
+        ground_truth.active_submissions(edition)
         .filter(pk__in=here.values("submission"))
         .filter(pk__in=board.values("submission"))
     )
@@ -174,7 +160,7 @@ def publish(
     replaces: int | None,
     leave_out: bool = False,
 ) -> Publication:
-    """Make an edition the board of its split, in one transaction.
+    """Make an edition the board of its split, and queue what it lacks, in one transaction.
 
     `replaces` is the number of the edition that the maintainer compared with. `leave_out` accepts that
     unfinished or newly rejected submissions leave the board. Raises `NotMaintainer` or `Refused`.
@@ -218,15 +204,13 @@ def roll_back(
                 "edition-refused",
                 f"{split.current_edition or split.pk} replaced no edition; it cannot be rolled back.",
             )
-        publication = ground_truth.make_board(
+        return ground_truth.make_board(
             edition=former,
             kind=Publication.Kind.ROLLED_BACK,
             reason=reason,
             now=now,
             actor=actor,
         )
-        queue_active(publication.edition)
-    return publication
 
 
 def predecessor(split: Split) -> Edition | None:
@@ -240,17 +224,24 @@ def predecessor(split: Split) -> Edition | None:
 
 
 def discard(*, edition: Edition, reason: str, now: datetime, actor: User | None) -> None:
-    """Give up an edition in preparation, and cancel what waits. Raises `NotMaintainer` or `Refused`."""
+    """Give up an edition in preparation. Raises `NotMaintainer` or `Refused`.
+
+    What waits for a draft is cancelled. A former edition that was opened again stays one: no further
+    submissions are queued for it, and what waits is scored, because it may be opened or published again.
+    """
     require_maintainer(actor, to="change editions")
     reason = _reason(reason)
     with transaction.atomic():
         edition, _ = _locked(edition)
         if not edition.is_in_preparation:
             raise Refused("edition-refused", f"{edition} is not in preparation; there is nothing to discard.")
-        edition.discarded_at = now
-        edition.save(update_fields=["discarded_at"])
-        lifecycle.cancel_edition(edition=edition)
-        audit.record_of(edition, "discarded", actor=actor, details={"reason": reason})
+        if edition.is_draft:
+            edition.discarded_at = now
+            lifecycle.cancel_edition(edition=edition)
+        edition.reopened_at = None
+        edition.save(update_fields=["discarded_at", "reopened_at"])
+        verb = "discarded" if edition.discarded_at else "closed_again"
+        audit.record_of(edition, verb, actor=actor, details={"reason": reason})
 
 
 def _locked(edition: Edition) -> tuple[Edition, Split]:

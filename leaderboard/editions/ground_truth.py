@@ -16,7 +16,9 @@ from evaluator.predictions.revisions import Comparison, compare
 from evaluator.units import RECORDING, Units
 from leaderboard import audit, board_versions
 from leaderboard.errors.refusals import Refused
-from leaderboard.models import Edition, GroundTruth, Publication, Split, TruthComparison, User
+from leaderboard.models import Edition, GroundTruth, Publication, Split, Submission, TruthComparison, User
+from leaderboard.models.submissions import SubmissionQuerySet
+from leaderboard.queue import lifecycle
 from leaderboard.statistics import disclosure
 from leaderboard.storage import files, manifests, truth_values
 
@@ -137,12 +139,14 @@ def uncompared(*, readable_truths: Collection[str]) -> list[tuple[GroundTruth, G
 
     They arise when the board changes during the preparation. `readable_truths` has the digests of both.
     """
-    editions = Edition.objects.filter(
-        published_at=None,
-        discarded_at=None,
-        ground_truth__in=readable_truths,
-        split__current_edition__ground_truth__in=readable_truths,
-    ).select_related("ground_truth", "split__current_edition__ground_truth")
+    editions = (
+        Edition.objects.in_preparation()
+        .filter(
+            ground_truth__in=readable_truths,
+            split__current_edition__ground_truth__in=readable_truths,
+        )
+        .select_related("ground_truth", "split__current_edition__ground_truth")
+    )
     pairs = {
         (edition.split.current_edition.ground_truth, edition.ground_truth)
         for edition in editions
@@ -211,12 +215,15 @@ def make_board(
     actor: User | None,
     left_out: Sequence[str] = (),
 ) -> Publication:
-    """Point the split, whose row the caller has locked, at this edition, and write the changelog."""
+    """Point the split, whose row the caller has locked, at this edition, and write the changelog.
+
+    What the edition lacks is queued: files may have been sent while nothing was queued for it.
+    """
+    queue_missing(edition)
     split = edition.split
     replaced = split.current_edition
-    if edition.published_at is None:
-        edition.published_at = now
-        edition.save(update_fields=["published_at"])
+    edition.published_at, edition.reopened_at = edition.published_at or now, None
+    edition.save(update_fields=["published_at", "reopened_at"])
     split.current_edition = edition
     split.save(update_fields=["current_edition"])
     audit.record_of(
@@ -236,3 +243,21 @@ def make_board(
         reason=reason,
         left_out=list(left_out),
     )
+
+
+def active_submissions(edition: Edition) -> SubmissionQuerySet:
+    """Return the active submissions of an edition's split, oldest first."""
+    rows = Submission.objects.active().filter(split=edition.split_id)
+    return rows.select_related("method__team").order_by("submitted_at")
+
+
+def queue_missing(edition: Edition) -> int:
+    """Queue every active submission that this edition has no evaluation of. Returns their number.
+
+    The caller has locked the split's row, so no new submission is missed.
+    """
+    missing = list(
+        active_submissions(edition).exclude(evaluations__edition=edition).values_list("pk", flat=True)
+    )
+    lifecycle.enqueue_many(submission_ids=missing, edition=edition)
+    return len(missing)

@@ -152,7 +152,7 @@ def maintainer_overview(split: Split) -> dict[str, Any]:
     return {
         "split": split,
         "published": published,
-        "former": [e for e in rows if e.published_at and e != published],
+        "former": [e for e in rows if e.published_at and e != published and not e.is_in_preparation],
         "in_preparation": [(e, corrections.progress(e)) for e in rows if e.is_in_preparation],
         "system_errors": [(e, n_failed[e.pk]) for e in rows if e.pk in n_failed],
         # What rolling back returns to.

@@ -10,7 +10,7 @@ from django.contrib.auth.models import AnonymousUser
 
 from leaderboard.boards import listing
 from leaderboard.boards.rows import scored_in
-from leaderboard.editions import corrections, history
+from leaderboard.editions import corrections, ground_truth, history
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, Evaluation, Status, Submission
 
@@ -125,7 +125,7 @@ def preview(edition: Edition) -> Preview:
             "edition-refused", f"The split {edition.split_id!r} has no published edition to compare with."
         )
     old, new = _side(published), _side(edition)
-    changes = [_change(submission, old, new) for submission in corrections.active_submissions(edition)]
+    changes = [_change(submission, old, new) for submission in ground_truth.active_submissions(edition)]
     changes.sort(
         key=lambda c: (-c.rank_change, c.new_rank or 10**6, c.method.casefold(), str(c.submission_id))
     )

@@ -218,6 +218,14 @@ class TruthComparison(models.Model):
         return f"{self.old_id} to {self.new_id}"
 
 
+class EditionQuerySet(models.QuerySet["Edition"]):
+    def in_preparation(self) -> Self:
+        """Return editions that may become the board next: drafts, and former ones that were opened again."""
+        return self.filter(
+            Q(published_at=None, discarded_at=None) | Q(published_at__isnull=False, reopened_at__isnull=False)
+        )
+
+
 class Edition(UnitOfInference):
     """A ground truth, protocol and decimals of a split."""
 
@@ -238,6 +246,9 @@ class Edition(UnitOfInference):
     opened_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
     published_at = models.DateTimeField(null=True, blank=True, help_text="When it first was the board.")
     discarded_at = models.DateTimeField(null=True, blank=True, help_text="Given up before it was published.")
+    reopened_at = models.DateTimeField(
+        null=True, blank=True, help_text="When a former edition was opened again; null once it is the board."
+    )
     # The entries whose intervals and rank ranges stand beside their scores; another set makes them stale.
     inferred_at = models.DateTimeField(null=True, blank=True)
     inference_digest = models.CharField(max_length=80, blank=True)
@@ -251,6 +262,8 @@ class Edition(UnitOfInference):
         blank=True,
         help_text="Effective number of units by score name: the degrees of freedom of its interval.",
     )
+
+    objects: ClassVar[EditionQuerySet] = EditionQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
 
     class Meta:
         ordering = ["split", "number"]
@@ -266,6 +279,10 @@ class Edition(UnitOfInference):
             models.CheckConstraint(
                 condition=models.Q(published_at=None) | models.Q(discarded_at=None),
                 name="published_editions_stay",
+            ),
+            models.CheckConstraint(
+                condition=models.Q(reopened_at=None) | models.Q(published_at__isnull=False),
+                name="only_former_editions_are_opened_again",
             ),
         ]
 
@@ -283,8 +300,13 @@ class Edition(UnitOfInference):
         return n
 
     @property
-    def is_in_preparation(self) -> bool:
+    def is_draft(self) -> bool:
         return self.published_at is None and self.discarded_at is None
+
+    @property
+    def is_in_preparation(self) -> bool:
+        """Tell whether it may become the board next, as `EditionQuerySet.in_preparation` finds them."""
+        return self.is_draft or self.reopened_at is not None
 
     def ended_at(self, split: Split) -> datetime | None:
         """Return when an earlier edition last stopped being the board."""

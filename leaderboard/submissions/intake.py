@@ -16,7 +16,7 @@ from evaluator.predictions.documents import EMPTY_MESSAGE
 from leaderboard import audit, board_versions
 from leaderboard.errors.refusals import Refused, clean_text, shown_split
 from leaderboard.methods import editing
-from leaderboard.models import Method, SentFile, Split, Submission, Team, User
+from leaderboard.models import Edition, Method, SentFile, Split, Submission, Team, User
 from leaderboard.people import teams
 from leaderboard.people.names import clean_name
 from leaderboard.queue import lifecycle
@@ -171,9 +171,9 @@ def _locked_team(user: User) -> Team:
 
 
 def _queue(submission: Submission, *, split: Split) -> None:
-    """Queue for the published edition and any draft; the caller has locked the split."""
-    in_preparation = Q(published_at=None, discarded_at=None)
-    for edition in split.editions.filter(in_preparation | Q(pk=split.current_edition_id)):
+    """Queue for the published edition and those in preparation; the caller has locked the split."""
+    editions = Edition.objects.filter(split=split)
+    for edition in editions.in_preparation() | editions.filter(Q(pk=split.current_edition_id)):
         lifecycle.enqueue(submission=submission, edition=edition)
 
 

@@ -41,6 +41,7 @@ _VERBS: Final = {
     "cleared": "texts deleted",
     "second factor reset": "two-factor authentication switched off",
     "hidden": "removed from all boards",
+    "reopened": "opened again",
 }
 _NOUNS: Final = {
     "ApiToken": "API token",

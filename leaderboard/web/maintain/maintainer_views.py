@@ -18,7 +18,7 @@ from leaderboard.editions import corrections, history, preview, splits
 from leaderboard.editions.preview import ABSENT
 from leaderboard.errors.refusals import NotMaintainer
 from leaderboard.mails import outbox
-from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, Team, User
+from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, Status, Team, User
 from leaderboard.pages import texts
 from leaderboard.web.boards import edition_tables, tables
 from leaderboard.web.decorators import asks_first
@@ -100,7 +100,7 @@ def open_edition(request: HttpRequest, split: str) -> HttpResponse:
             )
             return redirect("maintain_edition", split, opened.number)
     choices = edition_tables.truth_choices(split_row, form.truths)
-    drafts = split_row.editions.filter(published_at=None, discarded_at=None).select_related("ground_truth")
+    drafts = Edition.objects.in_preparation().filter(split=split_row).select_related("ground_truth")
     return form_page(request, "maintain/open.html", form, split=split_row, choices=choices, drafts=drafts)
 
 
@@ -157,11 +157,14 @@ def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
             messages.success(request, f"Edition {number} is now the {row.split.title} board.")
             return redirect("board", split)
     states = dict(row.evaluations.values_list("submission", "status"))
-    unfinished = [
-        (submission, preview_tables.STATUS_LABELS[states.get(submission.pk, ABSENT)])
-        for submission in corrections.unfinished(row)
-    ]
-    return form_page(request, "maintain/publish.html", form, unfinished=unfinished, **context)
+    unfinished = [(each, states.get(each.pk, ABSENT)) for each in corrections.unfinished(row)]
+    kinds = {state for _, state in unfinished}
+    context |= {
+        "unfinished": [(each, preview_tables.STATUS_LABELS[state]) for each, state in unfinished],
+        "has_failed": Status.SYSTEM_ERROR in kinds,
+        "can_reopen": row.published_at and not row.reopened_at and ABSENT in kinds,
+    }
+    return form_page(request, "maintain/publish.html", form, **context)
 
 
 @maintainers_form
@@ -191,7 +194,8 @@ def discard(request: HttpRequest, split: str, number: int) -> HttpResponse:
         with form.refusals():
             reason, actor = form.cleaned_data["reason"], maintainer_of(request)
             corrections.discard(edition=row, now=timezone.now(), actor=actor, reason=reason)
-            messages.success(request, f"Edition {number} of {split} was discarded.")
+            done = "closed again" if row.published_at else "discarded"
+            messages.success(request, f"Edition {number} of {split} was {done}.")
             return redirect("maintain")
     return form_page(request, "maintain/discard.html", form, **_comparison(row))
 

@@ -183,6 +183,60 @@ def test_edition_that_was_rolled_back_can_be_caught_up_and_published_again(
     assert board_now().edition == second
 
 
+def test_publishing_again_queues_what_came_since(
+    entries: list[Submission], owner: User, edition: Edition, rescored: Edition
+) -> None:
+    publish(rescored)
+    roll_back()
+    late = builders.submit(owner, builders.predictions(edition, factor=1.01), method="Late")
+    assert not late.evaluations.filter(edition=rescored).exists(), "a former edition stays as it was"
+    publication = publish(rescored, leave_out=True)
+    assert publication.left_out == [str(late.pk)]
+    assert late.evaluations.get(edition=rescored).status == Status.QUEUED
+    builders.score_all()
+    assert "Late" in {entry.method for entry in board_now().entries}
+
+
+def test_an_edition_opened_again_gets_what_is_sent_until_it_is_published(
+    entries: list[Submission], owner: User, edition: Edition, tmp_path: Path
+) -> None:
+    path = corrected(tmp_path, factor=1.3)
+    second, draft = open_edition(path), open_edition(corrected(tmp_path, factor=1.4))
+    builders.score_all()
+    publish(second)
+    roll_back()
+    assert open_edition(path) == open_edition(path) == second
+    assert AuditEvent.objects.filter(verb="reopened").count() == 1
+    between = builders.submit(owner, builders.predictions(edition, factor=1.01), method="Between")
+    builders.score_all()
+    assert {each.edition for each in between.evaluations.all()} == {edition, second, draft}
+    assert publish(second).left_out == []
+    second.refresh_from_db()
+    assert second.reopened_at is None
+    assert "Between" in {entry.method for entry in board_now().entries}
+
+
+def test_an_edition_opened_again_and_closed_again_gets_nothing_more_and_can_be_published(
+    entries: list[Submission], owner: User, edition: Edition, tmp_path: Path
+) -> None:
+    path = corrected(tmp_path, factor=1.3)
+    second = open_edition(path)
+    builders.score_all()
+    publish(second)
+    roll_back()
+    waiting = builders.submit(owner, builders.predictions(edition, factor=1.02), method="Waiting")
+    open_edition(path)
+    corrections.discard(edition=second, reason="Not yet.", now=timezone.now(), actor=None)
+    later = builders.submit(owner, builders.predictions(edition, factor=1.01), method="Later")
+    assert waiting.evaluations.get(edition=second).status == Status.QUEUED, "what waits is scored"
+    assert not later.evaluations.filter(edition=second).exists()
+    with pytest.raises(Refused, match="is not in preparation"):
+        corrections.discard(edition=second, reason="Again.", now=timezone.now(), actor=None)
+    publish(second, leave_out=True)
+    builders.score_all()
+    assert {"Waiting", "Later"} <= {entry.method for entry in board_now().entries}
+
+
 def test_discarded_edition_takes_no_work_and_cannot_be_published(
     entries: list[Submission], owner: User, edition: Edition, tmp_path: Path
 ) -> None:

@@ -22,7 +22,7 @@ from leaderboard.models import (
     User,
 )
 from tests import builders, pages
-from tests.editions import extended, open_edition, publish
+from tests.editions import extended, open_edition, publish, roll_back
 from tests.leaderboard.web.maintain import queue_rows
 from tests.leaderboard.web.maintain.desk import FIRST, HUB, OPEN, SECOND, effects, get, main_text
 
@@ -282,3 +282,38 @@ def test_csv_has_every_number_and_guards_texts(keeper: Client, rescored: Edition
     assert [row["delta_mid"] for row in rows] == [str(plain["delta_mid"]) for plain in expected]
     assert {row["team"] for row in rows} == {"'@team"}
     assert len([row for row in rows if row["method"].startswith("'=")]) == 1
+
+
+def test_publishing_again_keeps_what_its_page_promises(
+    keeper: Client, rescored: Edition, owner: User, edition: Edition
+) -> None:
+    publish(rescored)
+    roll_back()
+    late = builders.submit(owner, builders.predictions(edition, factor=1.01), method="Late")
+    text = main_text(keeper, f"{SECOND}publish/")
+    assert "Late Owls, submitted" in text
+    assert (
+        "What is not evaluated is queued; the new board shows unfinished submissions once they are scored."
+        in text
+    )
+    assert "open edition 2 again: select its ground truth" in text
+    form = {"replaces": 1, "reason": "Right after all.", "leave_out": "on"}
+    assert keeper.post(f"{SECOND}publish/", form).status_code == 302
+    builders.score_all()
+    assert late.evaluations.get(edition=rescored).status == Status.SCORED
+    assert "Late" in main_text(keeper, "/board/test/")
+
+
+def test_a_former_edition_is_opened_and_closed_again_on_its_pages(keeper: Client, rescored: Edition) -> None:
+    publish(rescored)
+    roll_back()
+    form = {"digest": rescored.ground_truth_id, "protocol": rescored.protocol}
+    assert keeper.post(OPEN, form).headers["Location"] == SECOND
+    assert "edition 2 former, opened again" in main_text(keeper, SECOND)
+    assert "opened again: edition 2" in main_text(keeper, HUB)
+    assert "Edition 2 is already opened again" in main_text(keeper, OPEN)
+    assert "open edition 2 again" not in main_text(keeper, f"{SECOND}publish/")
+    assert "Edition 2 stays a former edition" in main_text(keeper, f"{SECOND}discard/")
+    assert keeper.post(f"{SECOND}discard/", {"reason": "Not yet.", "confirm": "on"}).status_code == 302
+    assert "Edition 2 is not in preparation" in main_text(keeper, f"{SECOND}discard/")
+    assert "opened again" not in main_text(keeper, HUB)
