@@ -35,6 +35,9 @@ class Comparison(models.Model):
     asked_at = models.DateTimeField(
         null=True, blank=True, help_text="Empty: nobody waits for it; workers compute it last."
     )
+    begun_at = models.DateTimeField(
+        null=True, blank=True, help_text="When a worker last began it; without a result, it failed."
+    )
     computed_at = models.DateTimeField(null=True, blank=True)
     differences = models.JSONField(
         null=True,
@@ -48,7 +51,9 @@ class Comparison(models.Model):
         ]
         indexes = [
             models.Index(
-                fields=["asked_at"], condition=models.Q(computed_at=None), name="comparison_waiting"
+                fields=["begun_at", "asked_at"],
+                condition=models.Q(computed_at=None),
+                name="comparison_in_turn",
             ),
         ]
 

@@ -124,7 +124,7 @@ class EvaluationQuerySet(models.QuerySet["Evaluation"]):
             | Q(submitted_by__in=running.values("submission__submitted_by")),
             pk=OuterRef("submission"),
         )
-        return self.order_by("n_poison_strikes", "priority", Exists(of_the_same), "queued_at")
+        return self.order_by("n_poison_strikes", "priority", Exists(of_the_same), "queued_at", "pk")
 
     def suspect(self) -> Self:
         """Return evaluations that failed without a failure of machines: their file may be the cause."""

@@ -1,4 +1,4 @@
-"""The queue of comparisons: requested ones in order, others last."""
+"""The queue of comparisons: requested ones in order, then others; last those that failed, in turn."""
 
 import math
 from collections.abc import Collection, Sequence
@@ -77,11 +77,14 @@ def _write(*, edition: Edition, pairs: Sequence[Key], asked_at: datetime | None)
 
 
 def waiting(*, readable_truths: Collection[str]) -> QuerySet[Comparison]:
-    """Return comparisons to compute, in order, whose ground truth is in `readable_truths` (digests)."""
+    """Return comparisons to compute, in order, whose ground truth is in `readable_truths` (digests).
+
+    Those that were begun without a result come behind all others, so that no failure blocks another pair.
+    """
     rows = Comparison.objects.filter(computed_at=None, edition__ground_truth__in=readable_truths)
-    return rows.order_by(F("asked_at").asc(nulls_last=True), "pk")
+    return rows.order_by(F("begun_at").asc(nulls_first=True), F("asked_at").asc(nulls_last=True), "pk")
 
 
 def begin(row: Comparison, *, now: datetime) -> None:
-    """Send the pair to the end of the queue: one that fails must not block others."""
-    Comparison.objects.filter(pk=row.pk, computed_at=None).update(asked_at=now)
+    """Send the pair to the end of the queue, where it waits if it fails."""
+    Comparison.objects.filter(pk=row.pk, computed_at=None).update(begun_at=now)

@@ -5,6 +5,7 @@ again when those change, which a digest tells.
 """
 
 import hashlib
+import itertools
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -45,6 +46,8 @@ log = structlog.get_logger(__name__)
 Floats = NDArray[np.float64]
 # While an edition is being scored its entries change all the time; its ranges follow once a minute.
 MAX_DELAY = timedelta(minutes=1)
+# After so many unreadable files a round ends: the store may be away, and each file takes its time.
+MAX_UNREADABLE = 5
 # A worker that dies while it computes leaves the work to others after this time.
 CLAIM_S = 300.0
 # By the evaluation's id, of every column both ends, or None where there is no range.
@@ -172,12 +175,16 @@ def stale(*, now: datetime, readable_truths: Collection[str]) -> Iterator[Entrie
 def infer(entries: Entries, *, now: datetime, between: Callable[[], None] = lambda: None) -> bool:
     """Compute missing intervals and, for changed entries, rank ranges. Returns whether anything was written.
 
-    `between` is called every fraction of a second. Raises what `recording_sums.sums_of` raises.
+    `between` is called every fraction of a second. An entry whose file cannot be read keeps no other's
+    interval waiting; rank ranges count every entry, and wait for it. Raises `recording_sums.FAULTS`.
     """
     if entries.have_ranges or not _claim(entries.edition):
         return False
     try:
-        intervals = _intervals(entries, between=between)
+        intervals, faults = _intervals(entries, between=between)
+        if faults:
+            _write_intervals(entries, intervals)
+            raise faults[0]
         ranges = _ranges(entries, between=between)
         is_written = _write(entries, intervals=intervals, ranges=ranges, now=now)
     finally:
@@ -194,28 +201,49 @@ def _claim(edition: Edition) -> bool:
     return bool(EditionRanges.objects.filter(is_free, pk=row.pk).update(claimed_until=ends))
 
 
-def _intervals(entries: Entries, *, between: Callable[[], None]) -> list[Score]:
+def _intervals(entries: Entries, *, between: Callable[[], None]) -> tuple[list[Score], list[Exception]]:
+    """Return the missing intervals, and what kept the files of some entries from being read."""
     edition = entries.edition
     usable = uncertainty.usable_columns(recording_sums.unit_counts_of(edition))
     column_of = {name: j for j, name in enumerate(edition.rules.score_names)}
     missing: dict[UUID, list[Score]] = {}
-    for score in Score.objects.filter(evaluation__edition=edition, low=None):
+    # In random order: those whose file cannot be read at present keep no other waiting.
+    for score in Score.objects.filter(evaluation__edition=edition, low=None).order_by("?"):
         if usable[column_of[score_name(score.metric, score.ttc_range)]]:
             missing.setdefault(score.evaluation_id, []).append(score)
-    rows = [row for row in entries.rows if row.evaluation_id in missing]
-    for start in range(0, len(rows), uncertainty.BATCH):
+    by_id = {row.evaluation_id: row for row in entries.rows}
+    rows = [by_id[pk] for pk in missing if pk in by_id]
+    made: list[Score] = []
+    faults: list[Exception] = []
+    readable = _readable(edition, rows, faults=faults)
+    while some := list(itertools.islice(readable, uncertainty.BATCH)):
         between()
-        some = rows[start : start + uncertainty.BATCH]
-        sums = np.stack([recording_sums.unit_sums_of(edition, file=row.file) for row in some])
+        sums = np.stack([own for _, own in some])
         # As they are kept: ranges must not depend on which of them were made before.
         lows, highs = disclosure.published_ends(*bootstrap_of(edition).intervals(sums), edition=edition)
-        for i, row in enumerate(some):
+        for i, (row, _) in enumerate(some):
             for score in missing[row.evaluation_id]:
                 j = column_of[score_name(score.metric, score.ttc_range)]
                 score.low, score.high = (
                     rounded(ends[i, j], decimals=edition.decimals) for ends in (lows, highs)
                 )
-    return [score for row in rows for score in missing[row.evaluation_id]]
+                made.append(score)
+    return made, faults
+
+
+def _readable(
+    edition: Edition, rows: Sequence[ScoredEntry], *, faults: list[Exception]
+) -> Iterator[tuple[ScoredEntry, Floats]]:
+    """Yield entries with their sums, (U, columns); append to `faults` why others have none."""
+    for row in rows:
+        try:
+            sums = recording_sums.unit_sums_of(edition, file=row.file)
+        except recording_sums.FAULTS as fault:
+            faults.append(fault)
+            if len(faults) == MAX_UNREADABLE:
+                return
+        else:
+            yield row, sums
 
 
 def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Ranges] | None:
@@ -272,6 +300,17 @@ def bootstrap_of(edition: Edition) -> uncertainty.Bootstrap:
 @lru_cache(maxsize=1)
 def _bootstrap(seed: str, counts: bytes, shape: tuple[int, ...]) -> uncertainty.Bootstrap:
     return uncertainty.bootstrap_of(seed, np.frombuffer(counts).reshape(shape))
+
+
+def _write_intervals(entries: Entries, intervals: list[Score]) -> None:
+    if not intervals:
+        return
+    shown = {row.evaluation_id for row in entries.rows if row.is_shown}
+    with transaction.atomic():
+        edition = Edition.objects.select_for_update(no_key=True).get(pk=entries.edition.pk)
+        Score.objects.bulk_update(intervals, ["low", "high"], batch_size=500)
+        if edition.published_at and any(score.evaluation_id in shown for score in intervals):
+            board_versions.bump(edition.split_id)
 
 
 def _write(

@@ -8,25 +8,28 @@ import math
 import uuid
 from functools import lru_cache
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import structlog
 from django.conf import settings
 from numpy.typing import NDArray
 
-from evaluator import GroundTruth, rounded
+from evaluator import GroundTruth, Rejected, rounded
 from evaluator.metrics.protocol import get_protocol
 from evaluator.scoring import scores, uncertainty
 from evaluator.scoring.results import RecordingSums
 from evaluator.scoring.scores import Scorer
 from evaluator.units import Units
 from leaderboard.models import Edition, SentFile
-from leaderboard.sandbox import file_values
+from leaderboard.sandbox import child, file_values
 from leaderboard.storage import truth_values
 
 log = structlog.get_logger(__name__)
 
 Floats = NDArray[np.float64]
+FAULTS: Final = (OSError, Rejected, child.ChildDied, child.ChildNotReady, child.LeaseLost)
+"""What is raised where the values of a scored file cannot be read at present."""
 
 
 def path(edition: Edition, *, file: SentFile) -> Path:

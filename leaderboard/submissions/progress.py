@@ -1,10 +1,9 @@
 """The state of a submission: position in the queue, scores or problems."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-
-from django.db.models import Q
 
 from leaderboard.boards.rows import ConfidenceInterval, scored_of
 from leaderboard.db import clock
@@ -98,12 +97,9 @@ def progress_of(submission: Submission) -> Progress:
 def _n_ahead(evaluation: Evaluation) -> int:
     if evaluation.status != Status.QUEUED:
         return 0
-    earlier = Q(priority__lt=evaluation.priority) | Q(
-        priority=evaluation.priority, queued_at__lt=evaluation.queued_at
-    )
-    # What has stopped its reader waits behind all others.
-    waiting = Evaluation.objects.due().filter(earlier, n_poison_strikes__lte=evaluation.n_poison_strikes)
-    return waiting.exclude(pk=evaluation.pk).count()
+    # One that waits for another try is not due yet, and comes after all that is.
+    before = itertools.takewhile(evaluation.pk.__ne__, Evaluation.objects.due().values_list("pk", flat=True))
+    return sum(1 for _ in before)
 
 
 def _is_late(evaluation: Evaluation) -> bool:

@@ -6,19 +6,17 @@ from datetime import datetime
 from functools import partial
 
 import structlog
+from django.db import InterfaceError, OperationalError
 
-from evaluator import Rejected
 from leaderboard.editions import ground_truth
 from leaderboard.queue import worker
-from leaderboard.sandbox import child
-from leaderboard.statistics import analyses, comparison_queue, comparisons, confidence
+from leaderboard.statistics import analyses, comparison_queue, comparisons, confidence, recording_sums
 from leaderboard.storage import truth_values
 
 log = structlog.get_logger(__name__)
 
 # Of each kind at most so much in one go, so that every kind has its turn.
 MAX_AT_ONCE = 50
-FAULTS = (OSError, Rejected, child.ChildDied, child.ChildNotReady, child.LeaseLost)
 
 
 class Stopping(Exception):
@@ -28,20 +26,31 @@ class Stopping(Exception):
 def work_off(*, now: datetime, rng: random.Random, is_stopping: Callable[[], bool] = lambda: False) -> int:
     """Do the waiting jobs that this worker has the values for. Returns how many.
 
-    What fails is logged and left for the next time.
+    What fails is logged and left for the next time. A fault that nobody foresaw is raised once all other jobs
+    have had their turn.
     """
     between = partial(_yield_to_live_work, rng=rng, is_stopping=is_stopping)
+    n_done, bugs = 0, list[Exception]()
     try:
-        return sum(_done(task, between) for task in _tasks(now=now, between=between))
+        for task in _tasks(now=now, between=between):
+            try:
+                n_done += _done(task, between)
+            except (Stopping, OperationalError, InterfaceError):
+                raise
+            except Exception as bug:  # noqa: BLE001 - raised below
+                bugs.append(bug)
     except Stopping:
         return 0
+    if bugs:
+        raise bugs[0]
+    return n_done
 
 
 def _done(task: Callable[[], object], between: Callable[[], None]) -> bool:
     between()
     try:
         task()
-    except FAULTS as fault:
+    except recording_sums.FAULTS as fault:
         log.warning("backlog_failed", reason=f"{type(fault).__name__}: {fault}"[:200])
         return False
     return True

@@ -89,13 +89,22 @@ def clean(*, now: datetime) -> None:
     forgetting.delete_late_rows()
     addresses.delete_unproved(now=now)
     n_files = n_bytes = n_leftovers = 0
+    faults: list[OSError] = []
     for orphan in orphans.orphans(now=now):
-        if orphans.remove(orphan, now=now):
+        try:
+            is_removed = orphans.remove(orphan, now=now)
+        except OSError as fault:
+            # One file that cannot be removed keeps no other.
+            faults.append(fault)
+            continue
+        if is_removed:
             n_files, n_bytes = n_files + 1, n_bytes + orphan.size_bytes
     # Half-written files of processes that were killed.
     for path in orphans.leftovers():
         path.unlink(missing_ok=True)
         n_leftovers += 1
+    if faults:
+        raise faults[0]
     SweepBeat.objects.update(cleaned_at=now)
     log.info("cleaned", n_files=n_files, n_bytes=n_bytes, n_leftovers=n_leftovers)
 

@@ -238,6 +238,34 @@ def test_sums_that_are_gone_are_made_again_from_values_and_from_the_file(
     assert means == pytest.approx(list(builders.evaluator.evaluate(predictions, truth).flat().values()))
 
 
+def test_one_unreadable_file_keeps_no_other_interval_waiting(
+    entries: list[Submission], edition: Edition, second: Edition
+) -> None:
+    builders.score_all()
+    lost, *others = entries
+    for each in (edition, second):
+        recording_sums.path(each, file=lost.sent_file).unlink()
+    name = files.aligned_name(manifest_digest=edition.ground_truth.manifest_digest, digest=lost.digest)
+    aligned, sent = (
+        Path(files.store().path(name)),
+        Path(files.store().path(files.predictions_name(lost.digest))),
+    )
+    kept = sent.read_bytes()
+    aligned.unlink()
+    sent.unlink()
+    builders.infer_all()
+    with_interval = Score.objects.exclude(low=None).values_list(
+        "evaluation__submission", "evaluation__edition"
+    )
+    expected = {(entry.pk, each.pk) for entry in others for each in (edition, second)}
+    assert set(with_interval) == expected
+    assert not EditionRanges.objects.exclude(digest="").exists(), "ranks count every entry"
+    sent.write_bytes(kept)
+    builders.infer_all()
+    assert set(with_interval.all()) == expected | {(lost.pk, each.pk) for each in (edition, second)}
+    assert EditionRanges.objects.exclude(digest="").count() == 2
+
+
 def test_nothing_is_written_when_the_entries_change_meanwhile(
     entries: list[Submission], edition: Edition, owner: User
 ) -> None:

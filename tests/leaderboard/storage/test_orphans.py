@@ -50,6 +50,18 @@ def orphan(settings: Settings, db: None) -> Path:
     return path
 
 
+def test_an_orphan_that_cannot_be_removed_keeps_no_other(orphan: Path, settings: Settings) -> None:
+    second = path_of(keep(b'{"0": 2.5}').digest, settings)
+    age(second, hours=48)
+    stuck, other = sorted([orphan, second])
+    # Where it is put aside, a folder stands in its way.
+    Path(settings.FILES_DIR, files.INCOMING, f"removed-{stuck.name}").mkdir(parents=True)
+    with pytest.raises(OSError, match="directory"):
+        pollers.clean(now=timezone.now())
+    assert stuck.exists()
+    assert not other.exists()
+
+
 def test_orphan_and_its_values_are_removed_and_that_is_recorded(orphan: Path, settings: Settings) -> None:
     values = files.aligned_name(manifest_digest="sha256:" + "a" * 64, digest="sha256:" + "b" * 64)
     files.store().save(values, ContentFile(b"12345678"))

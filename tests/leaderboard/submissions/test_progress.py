@@ -28,6 +28,38 @@ def test_position_counts_those_that_are_claimed_before(edition: Edition, owner: 
     assert [progress(row).n_ahead for row in rows] == [0, 0, 1, 2]
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_the_number_ahead_is_the_order_in_which_files_are_taken(
+    edition: Edition, owner: User, stranger: User, seed: int
+) -> None:
+    rng = random.Random(seed)
+    for _ in range(8):
+        priority = rng.choice([Evaluation.PRIORITY_LIVE, Evaluation.PRIORITY_RESCORE])
+        row = queue_rows.queued(edition, rng.choice([owner, stranger]), priority=priority)
+        strikes = {"n_poison_strikes": rng.randrange(3), "n_infrastructure_strikes": rng.randrange(3)}
+        Evaluation.objects.filter(pk=row.pk).update(**strikes)
+    if seed % 2:
+        queue_rows.claim()  # the other files of its team come later among equals
+    waiting = Evaluation.objects.filter(status=Status.QUEUED)
+    ahead = {row.pk: progress(row).n_ahead for row in waiting}
+    n_waiting = len(ahead)
+    taken = []
+    for _ in range(n_waiting):
+        lease = queue_rows.claim()
+        taken.append(lease.evaluation_id)
+        lifecycle.finalise(lease, queue_rows.SCORED)
+    assert [ahead[pk] for pk in taken] == list(range(n_waiting))
+
+
+def test_one_that_waits_for_another_try_comes_after_all_that_is_due(edition: Edition, owner: User) -> None:
+    struck = queue_rows.queued(edition, owner)
+    lifecycle.fail_attempt(queue_rows.claim(), strike=Strike.INFRASTRUCTURE, reason="disk", rng=RNG)
+    queue_rows.queued(edition, owner, priority=Evaluation.PRIORITY_RESCORE)
+    assert progress(struck).n_ahead == 1
+    queue_rows.make_due()
+    assert progress(struck).n_ahead == 0
+
+
 def test_one_that_waits_for_another_try_is_in_nobodys_way(edition: Edition, owner: User) -> None:
     queue_rows.queued(edition, owner)
     second = queue_rows.queued(edition, owner)
