@@ -300,6 +300,16 @@ def save_manifest(manifest: Manifest) -> None:
 
 @contextmanager
 def opened_predictions(digest: str) -> Iterator[IO[bytes]]:
-    """Open a prediction file with a file descriptor. Raises `OSError`."""
+    """Open a prediction file with a file descriptor. Raises `OSError`, also for other bytes than were sent.
+
+    A file that the store has damaged would else be read as one that its team has made wrong.
+    """
     with open_named(predictions_name(digest)) as kept:
+        with answering():
+            stored = hashlib.file_digest(kept, "sha256").hexdigest()
+        if f"sha256:{stored}" != digest:
+            raise StoreUnavailable(
+                errno.EIO, "the file store has other bytes than were sent under this digest"
+            )
+        kept.seek(0)
         yield kept

@@ -114,6 +114,22 @@ def test_file_that_the_store_has_lost_is_not_blamed(edition: Edition, owner: Use
     assert "the file store lacks a file" in evaluation_of(submission).last_error
 
 
+@pytest.mark.parametrize("change", ["another value", "no JSON", "cut off", "empty"])
+def test_file_that_the_store_has_damaged_is_not_blamed(edition: Edition, owner: User, change: str) -> None:
+    data = builders.predictions(edition)
+    submission = builders.submit(owner, data)
+    damaged = {"another value": data.replace(b"1", b"2", 1), "no JSON": b"\x00" + data, "cut off": data[:99]}
+    Path(files.store().path(files.predictions_name(submission.digest))).write_bytes(damaged.get(change, b""))
+    assert run_next()
+    assert strikes(submission) == (0, 1)
+    assert evaluation_of(submission).status == Status.QUEUED
+    assert "the file store has other bytes" in evaluation_of(submission).last_error
+    Path(files.store().path(files.predictions_name(submission.digest))).write_bytes(data)
+    queue_rows.make_due()
+    builders.score_all()
+    assert evaluation_of(submission).status == Status.SCORED
+
+
 def test_damaged_ground_truth_does_not_count_against_the_file(edition: Edition, owner: User) -> None:
     submission = builders.submit(owner, builders.predictions(edition))
     truth_values.load.cache_clear()
