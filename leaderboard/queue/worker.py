@@ -21,7 +21,7 @@ from evaluator.scoring.scores import Scorer
 from leaderboard.models import Edition, Evaluation, SentFile, Status
 from leaderboard.queue import lifecycle
 from leaderboard.queue.lifecycle import Lease, LostRace, RunResult, Strike
-from leaderboard.sandbox import child, file_values
+from leaderboard.sandbox import child, file_values, former_keys
 from leaderboard.statistics import recording_sums
 from leaderboard.storage import truth_values
 
@@ -244,7 +244,7 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> RunRes
         predictions = file_values.read(file, edition, heartbeat=heartbeat)
         report = scorer.report(predictions, keep_bags=True)
     except Rejected as rejected:
-        return rejection(rejected)
+        return rejection(former_keys.explained(rejected, file=file, edition=edition))
     recording_sums.save(edition, file=file, bags=report.bags)
     return scored(report, decimals=edition.decimals, warnings=warnings_of(predictions))
 

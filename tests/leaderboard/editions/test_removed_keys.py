@@ -1,0 +1,64 @@
+"""A file with keys of sequences that a correction removed is told so; of drafts nothing is told."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from leaderboard.models import Edition, Status, User
+from leaderboard.storage import truth_values
+from tests import builders
+from tests.editions import corrected, extended, open_edition, publish, roll_back
+
+pytestmark = pytest.mark.slow
+
+
+def problem_of(user: User, predictions: dict[str, float] | bytes) -> str:
+    """The first problem of a file that is sent now."""
+    data = predictions if isinstance(predictions, bytes) else json.dumps(predictions).encode()
+    submission = builders.submit(user, data, method="Old keys")
+    builders.score_all()
+    row = submission.evaluations.get(edition=submission.split.current_edition)
+    assert row.status == Status.REJECTED
+    return row.problems[0]["message"]
+
+
+def by_natural_key(edition: Edition) -> dict[str, float]:
+    truth = truth_values.load(edition.ground_truth_id)
+    return dict(zip(truth.manifest.natural_keys, truth.ttc_s.tolist(), strict=True))
+
+
+def csv(predictions: dict[str, float]) -> bytes:
+    rows = [[*key.split("/"), repr(value)] for key, value in predictions.items()]
+    return "\n".join(
+        ",".join(row) for row in [["bag_stamp", "cam_id", "ts", "track_id", "ttc"], *rows]
+    ).encode()
+
+
+def test_a_removed_sequence_is_named_as_such_with_the_edition(
+    edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    old = by_natural_key(edition)
+    builders.import_truth(tmp_path, split="val", seed=3)
+    publish(open_edition(corrected(tmp_path, factor=1.3)))
+    publish(open_edition(corrected(tmp_path, drop="0002")), replaces=2)
+    sentence = "was in the manifest until edition 2: edition 3 removed it."
+    assert sentence in problem_of(owner, old)
+    assert sentence in problem_of(owner, csv(old))
+    assert "edition" not in problem_of(owner, {"0099/1/5/1": 1.0})
+
+
+def test_keys_of_an_edition_that_was_rolled_back_are_not_called_removed(
+    edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    publish(open_edition(extended(tmp_path)), leave_out=True)
+    roll_back()
+    sent = by_natural_key(edition) | {"0001/9/700000000/1": 3.5}
+    expected = "is in the manifest of edition 2, which is not the current one."
+    assert expected in problem_of(owner, sent)
+
+
+def test_keys_of_a_draft_are_unknown_and_nothing_more(edition: Edition, owner: User, tmp_path: Path) -> None:
+    open_edition(extended(tmp_path))
+    sent = by_natural_key(edition) | {"0001/9/700000000/1": 3.5}
+    assert "edition" not in problem_of(owner, sent)
