@@ -6,7 +6,7 @@ from django.urls import include, path, re_path
 
 from leaderboard.api.exceptions import UnknownAddressView
 from leaderboard.web import monitoring
-from leaderboard.web.account import providers
+from leaderboard.web.account import identity, providers
 from leaderboard.web.submissions import submission_views
 
 # Its own form knows no limit of how often one may guess.
@@ -17,6 +17,8 @@ urlpatterns = [
     path("api/v1/", include("leaderboard.api.urls")),
     re_path(r"^api(/|$)", UnknownAddressView.as_view()),
     path(".well-known/tsttc-receipt-keys.json", submission_views.receipt_keys, name="receipt_keys"),
+    path("accounts/reauthenticate/code/", identity.MailedCodeView.as_view(), name=identity.URL_NAME),
+    path("accounts/password/set/", identity.set_password, name="account_set_password"),
     path("accounts/", include("allauth.account.urls")),
     path("accounts/2fa/", include("allauth.mfa.urls")),
     path("accounts/", include(providers.patterns())),

@@ -212,6 +212,8 @@ LINES: dict[str, Line] = {
     "account_logout": line(GET="302 200 200 200 200 302 302", POST=all_of("302")),
     "account_inactive": line(GET=OPEN),
     "account_reauthenticate": line(GET=SIGNED_IN, POST=SIGNED_IN),
+    # All have a password, and are led to it.
+    "account_reauthenticate_by_code": line(GET=SENT_ON, POST=SENT_ON),
     "account_email": line(GET=SIGNED_IN, POST="in 302 302 302 302 in in"),
     "account_email_verification_sent": line(GET=OPEN),
     "account_change_password": line(GET=SIGNED_IN, POST=SIGNED_IN),

@@ -13,6 +13,7 @@ from allauth.account import forms
 from allauth.account.adapter import DefaultAccountAdapter, get_adapter
 from allauth.account.models import EmailAddress, Login
 from allauth.core import context as allauth_context
+from allauth.core.exceptions import ReauthenticationRequired
 from allauth.core.internal import ratelimit
 from allauth.mfa.adapter import DefaultMFAAdapter
 from allauth.mfa.models import Authenticator
@@ -29,6 +30,7 @@ from django.utils import timezone
 from leaderboard.mails import outbox
 from leaderboard.models import User
 from leaderboard.people import addresses, second_factor
+from leaderboard.web.account import identity
 
 KNOWN_ADDRESS_S = 90 * 24 * 3600
 
@@ -104,7 +106,19 @@ class AccountAdapter(DefaultAccountAdapter):
     def get_reauthentication_methods(self, user: User | AnonymousUser) -> list[dict[str, Any]]:
         # By code alone where there is one: a known password shows no recovery codes.
         methods: list[dict[str, Any]] = super().get_reauthentication_methods(user)
+        if not methods and user.is_authenticated and addresses.are_proved():
+            url = reverse(identity.URL_NAME)
+            return [{"id": "mailed_code", "description": "Use a code that we email to you", "url": url}]
         return [each for each in methods if each["id"] == "mfa_reauthenticate"] or methods
+
+    def is_reauthentication_required(self, *, app: str, **kwargs: Any) -> bool:
+        required = bool(super().is_reauthentication_required(app=app, **kwargs))
+        request = allauth_context.request
+        methods = self.get_reauthentication_methods(request.user) if required else []
+        # allauth asks nothing of accounts that have no way of its own.
+        if [each["id"] for each in methods] == ["mailed_code"] and not identity.was_confirmed(request):
+            raise ReauthenticationRequired
+        return required
 
     def _get_login_attempts_cache_key(self, request: HttpRequest, **credentials: Any) -> str:
         return f"{_login_of(credentials)}:{ratelimit.get_ip(request)}"

@@ -10,6 +10,9 @@ SETTINGS: Final[dict[str, Any]] = {
     "ACCOUNT_SIGNUP_FIELDS": ["email*", "password1*", "password2*"],
     "ACCOUNT_SIGNUP_FORM_CLASS": f"{_HERE}.team_views.SignupNameForm",
     "ACCOUNT_SESSION_REMEMBER": True,
+    # A found open session must not be enough to take the account over: changed addresses, and all else that
+    # `identity.py` names, need the password, a code of the app, or a mailed code.
+    "ACCOUNT_REAUTHENTICATION_REQUIRED": True,
     # Who is new has no submissions to come back to.
     "ACCOUNT_SIGNUP_REDIRECT_URL": "/submit/",
     "ACCOUNT_ADAPTER": f"{_HERE}.accounts.AccountAdapter",
@@ -48,7 +51,6 @@ SETTINGS: Final[dict[str, Any]] = {
     },
     # Who signs up reads of the rules first, and chooses a name.
     "SOCIALACCOUNT_AUTO_SIGNUP": False,
-    # A found open session must not be enough to add another way into the account.
     "SOCIALACCOUNT_REAUTHENTICATION_REQUIRED": True,
     "SOCIALACCOUNT_REQUESTS_TIMEOUT": 5,
 }

@@ -2,6 +2,7 @@
 
 from typing import cast
 
+from allauth.account.decorators import reauthentication_required
 from django import forms
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
@@ -52,7 +53,6 @@ class TokenForm(SiteForm):
 
 
 @own_form
-@sensitive_variables("secret")
 def token_page(request: HttpRequest) -> HttpResponse:
     """List and make tokens; a new one is shown once, on the next page."""
     user = cast("User", request.user)
@@ -60,15 +60,27 @@ def token_page(request: HttpRequest) -> HttpResponse:
     form = TokenForm.asked(request)
     if form.is_valid():
         with form.refusals():
-            limits = {name: form.cleaned_data[name] for name in ("name", "scopes", "days")}
-            secret = tokens.create(user=user, now=now, split_name=form.cleaned_data["split"], **limits)
-            return shown_once.redirect_with(secret, request=request, to="tokens")
+            return _create(request, form)
     # Those that have ended stay, to tell what an old job used.
     own = ApiToken.objects.filter(user=user).order_by("-created")
     rows = [(token, tokens.state_of(token, now=now)) for token in own]
     context = {"form": form, "rows": rows}
     status = 422 if form.errors else 200
     return shown_once.render_with(request, "account/tokens.html", context, at="tokens", status=status)
+
+
+@reauthentication_required
+@sensitive_variables("secret")
+def _create(request: HttpRequest, form: TokenForm) -> HttpResponse:
+    # A token outlives the session, which may be one that was found open.
+    limits = {name: form.cleaned_data[name] for name in ("name", "scopes", "days")}
+    secret = tokens.create(
+        user=cast("User", request.user),
+        now=timezone.now(),
+        split_name=form.cleaned_data["split"],
+        **limits,
+    )
+    return shown_once.redirect_with(secret, request=request, to="tokens")
 
 
 @own_action

@@ -41,3 +41,9 @@ def signs_in(email: str, password: str) -> bool:
     client = Client()
     client.post("/accounts/login/", {"login": email, "password": password})
     return client.get("/submissions/").status_code == 200
+
+
+def confirm(client: Client, password: str = "correct horse") -> None:
+    """Confirm with the password who acts, as before everything that may take an account over."""
+    answer = client.post("/accounts/reauthenticate/", {"password": password, "next": "/account/"})
+    assert answer.headers["Location"] == "/account/"

@@ -27,11 +27,12 @@ from leaderboard.ops import environment
 from leaderboard.web.account import providers
 from leaderboard.web.middleware import middleware_order
 from tests.leaderboard.web.account.oauth_server import CODE, HANGS, IID, TOKEN, Provider, lead_to, running
-from tests.leaderboard.web.account.proving import proving
+from tests.leaderboard.web.account.proving import code_in, proving
 from tests.leaderboard.web.test_every_page import assert_sound
 
 PASSWORD = "correct horse"
 NEW = "new@example.org"
+BY_CODE = "/accounts/reauthenticate/code/"
 SEEN = [(NEW, True, True)]
 
 
@@ -148,7 +149,34 @@ def test_a_verified_address_makes_an_account_that_signs_in_again(provider: Provi
     refused = again.post("/accounts/3rdparty/", {"account": account.pk})
     assert "set a password first" in refused.text
     assert again.get("/accounts/password/change/").headers["Location"] == "/accounts/password/set/"
+    asks = again.get("/accounts/password/set/").headers["Location"]
+    assert asks.startswith(BY_CODE), "an open session alone sets no password"
+    assert_sound(again.get(asks))
+    again.post(BY_CODE, {"code": code_in(mail.outbox[-1]), "next": "/account/"})
     assert_sound(again.get("/accounts/password/set/"))
+
+
+def test_without_a_password_a_mailed_code_is_asked_for_before_providers_change(
+    provider: Provider, owner: User
+) -> None:
+    owner.set_unusable_password()
+    owner.save()
+    EmailAddress.objects.create(user=owner, email=owner.email, verified=True, primary=True)
+    kept = SocialAccount.objects.create(user=owner, provider="orcid", uid=IID)
+    client = Client()
+    client.force_login(owner)
+    asks = arrive(client, process="connect")
+    asks = client.get(asks.headers["Location"]) if "code" not in asks.headers["Location"] else asks
+    assert asks.headers["Location"].startswith(BY_CODE)
+    assert list(SocialAccount.objects.filter(user=owner)) == [kept]
+    client.get(BY_CODE)
+    client.post(BY_CODE, {"code": code_in(mail.outbox[-1])})
+    assert SocialAccount.objects.filter(user=owner).count() == 2
+    found = Client()
+    found.force_login(owner)
+    refused = found.post("/accounts/3rdparty/", {"account": kept.pk})
+    assert refused.headers["Location"].startswith(BY_CODE)
+    assert SocialAccount.objects.filter(user=owner).count() == 2
 
 
 def test_orcid_tells_the_id_and_an_address_is_proved_by_mail(provider: Provider, client: Client) -> None:

@@ -10,10 +10,16 @@ from rest_framework.test import APIClient
 
 from leaderboard.models import ApiToken, User
 from tests import builders, pages
+from tests.leaderboard.web.account.proving import confirm
 from tests.leaderboard.web.test_every_page import assert_sound
 
 PAGE = "/tokens/"
 FIELDS = {"name": "nightly CI", "scopes": ["read", "submit"], "split": "", "days": "90"}
+
+
+@pytest.fixture(autouse=True)
+def _confirmed(signed_in: Client) -> None:
+    confirm(signed_in)
 
 
 def make(client: Client, **fields: object) -> pages.Element:
