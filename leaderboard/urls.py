@@ -6,7 +6,7 @@ from django.urls import include, path, re_path
 
 from leaderboard.api.exceptions import UnknownAddressView
 from leaderboard.web import monitoring
-from leaderboard.web.account import identity, providers
+from leaderboard.web.account import entrance_views, identity, providers
 from leaderboard.web.submissions import submission_views
 
 # Its own form knows no limit of how often one may guess.
@@ -18,6 +18,7 @@ urlpatterns = [
     re_path(r"^api(/|$)", UnknownAddressView.as_view()),
     path(".well-known/tsttc-receipt-keys.json", submission_views.receipt_keys, name="receipt_keys"),
     path("accounts/reauthenticate/code/", identity.MailedCodeView.as_view(), name=identity.URL_NAME),
+    path("accounts/confirm-email/", entrance_views.confirm_address, name="account_email_verification_sent"),
     path("accounts/password/set/", identity.set_password, name="account_set_password"),
     path("accounts/", include("allauth.account.urls")),
     path("accounts/2fa/", include("allauth.mfa.urls")),

@@ -21,6 +21,11 @@ def accounts_of(address: str) -> QuerySet[User]:
     return User.objects.filter(has_it | has_proved_it).exclude(_is_unconfirmed())
 
 
+def is_unconfirmed(user: User) -> bool:
+    """Tell whether the account was signed up for and never confirmed; False where nobody proves addresses."""
+    return are_proved() and User.objects.filter(_is_unconfirmed(), pk=user.pk).exists()
+
+
 def release(*, address: str, to: User | None = None) -> None:
     """Delete unconfirmed accounts with this address, except that of `to`."""
     if not are_proved():

@@ -28,7 +28,7 @@ from django.urls import reverse
 from django.utils import timezone
 
 from leaderboard.mails import outbox
-from leaderboard.models import User
+from leaderboard.models import MailKind, User
 from leaderboard.people import addresses, second_factor
 from leaderboard.web.account import identity
 
@@ -50,6 +50,7 @@ class AccountAdapter(DefaultAccountAdapter):
         "incorrect_code": "The code is wrong; expected the code of the last mail that we sent for this.",
         # As long as ACCOUNT_RATE_LIMITS says.
         "too_many_login_attempts": "Too many failed sign-ins. Try again in 5 minutes, or reset the password.",
+        "too_many_logins": "Too many sign-ins. Try again in 5 minutes.",
         "too_many_codes": "Too many wrong codes. Try again in 5 minutes.",
         "too_many_codes_today": "Too many wrong codes. Try again tomorrow.",
         "too_many_logins_anywhere": "Too many failed sign-ins. Try again in an hour, or reset the password.",
@@ -71,9 +72,14 @@ class AccountAdapter(DefaultAccountAdapter):
         return str(super().get_login_redirect_url(request))
 
     def pre_authenticate(self, request: HttpRequest, **credentials: Any) -> None:
-        """Count one try. Raises allauth's validation error after too many wrong ones."""
+        """Count one try. Raises allauth's validation error after too many, and after fewer wrong ones."""
         super().pre_authenticate(request, **credentials)
         login = _login_of(credentials)
+        key = self._get_login_attempts_cache_key(request, **credentials)
+        # A right password costs as much of the processor as a wrong one.
+        if not ratelimit.consume(request, app="allauth.account", action="login_tried", key=key):
+            self._rollback_login_failed_rl_usage()
+            raise self.validation_error("too_many_logins")
         if cache.get(known_address_key(login, ratelimit.get_ip(request))):
             return
         usage = ratelimit.consume(request, app="allauth.account", action="login_failed_anywhere", key=login)
@@ -85,6 +91,12 @@ class AccountAdapter(DefaultAccountAdapter):
 
     def authenticate(self, request: HttpRequest, **credentials: Any) -> Any:
         user = super().authenticate(request, **credentials)
+        if user and addresses.is_unconfirmed(user):
+            # Whoever made it needs to show that the address is theirs, and is told what a wrong password is
+            # told: else anybody could sign up with an address, sign in, and learn whether it was free.
+            self.pre_authenticate(request, **credentials)
+            _remind(user)
+            return None
         if user:
             address = ratelimit.get_ip(request)
             cache.set(known_address_key(_login_of(credentials), address), value=True, timeout=KNOWN_ADDRESS_S)
@@ -186,6 +198,24 @@ class ResetPasswordForm(forms.ResetPasswordForm):
         theirs = set(addresses.accounts_of(address))
         self.users = [user for user in self.users if user in theirs]  # type: ignore[has-type]  # allauth sets it here alone
         return address
+
+
+def _remind(user: User) -> None:
+    """Mail how to confirm the address, at most once an hour."""
+    now = timezone.now()
+    name = settings.BENCHMARK.site_name
+    text = (
+        f"Someone entered the right password of your {name} account, which is not confirmed and cannot be "
+        "used. Enter the code of our first mail in the browser in which you signed up, or sign up "
+        f"again:\n\n{settings.SITE_URL}{reverse('account_signup')}\n\n"
+        "If this wasn't you, do nothing: the account is deleted within a day.\n\n"
+        f"--\n{name}\n{settings.SITE_URL}\n"
+    )
+    subject = f"[{name}] Your account is not confirmed yet"
+    # By the outbox, so that the answer takes as long as that to a wrong password.
+    key = f"unconfirmed:{user.pk}:{now:%Y%m%d%H}"
+    mail = outbox.notice(kind=MailKind.ACCOUNT, user=user, key=key, subject=subject, text=text, now=now)
+    outbox.queue([mail])
 
 
 def _login_of(credentials: dict[str, Any]) -> str:

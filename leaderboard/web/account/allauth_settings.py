@@ -21,9 +21,11 @@ SETTINGS: Final[dict[str, Any]] = {
         "confirm_email_verification_code": f"{_HERE}.accounts.ConfirmAddressForm",
         "reset_password": f"{_HERE}.accounts.ResetPasswordForm",
     },
-    # Wrong passwords and wrong codes; the keys are an account at an address, and an account (see accounts.py
-    # and codes.py).
+    # Sign-ins, wrong passwords and wrong codes; the keys are an account at an address, and an account (see
+    # accounts.py and codes.py).
     "ACCOUNT_RATE_LIMITS": {
+        "login": "20/m/ip",
+        "login_tried": "20/5m/key,100/d/key",
         "login_failed": "10/m/ip,5/5m/key",
         "login_failed_anywhere": "30/h/key",
         "code_failed": "10/m/ip,5/5m/key,50/d/key",
