@@ -6,7 +6,7 @@ from django.urls import include, path, re_path
 
 from leaderboard.api.exceptions import UnknownAddressView
 from leaderboard.web import monitoring
-from leaderboard.web.account import entrance_views, identity, providers
+from leaderboard.web.account import entrance_views, identity, providers, undo_views
 from leaderboard.web.submissions import submission_views
 
 # Its own form knows no limit of how often one may guess.
@@ -19,6 +19,8 @@ urlpatterns = [
     path(".well-known/tsttc-receipt-keys.json", submission_views.receipt_keys, name="receipt_keys"),
     path("accounts/reauthenticate/code/", identity.MailedCodeView.as_view(), name=identity.URL_NAME),
     path("accounts/confirm-email/", entrance_views.confirm_address, name="account_email_verification_sent"),
+    path("accounts/email/", entrance_views.own_addresses, name="account_email"),
+    path("accounts/undo/<str:secret>/", undo_views.undo, name="account_undo"),
     path("accounts/password/set/", identity.set_password, name="account_set_password"),
     path("accounts/", include("allauth.account.urls")),
     path("accounts/2fa/", include("allauth.mfa.urls")),

@@ -16,7 +16,7 @@ from leaderboard.models.inference import Analysis, Comparison, EditionRanges
 from leaderboard.models.mails import Mail, MailKind
 from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
 from leaderboard.models.pages import PageVersion
-from leaderboard.models.people import ApiToken, Invitation, Membership, Scope, Team, User
+from leaderboard.models.people import AccountChange, ApiToken, Invitation, Membership, Scope, Team, User
 from leaderboard.models.quotas import Admission, QuotaOverride, SpentMailbox
 from leaderboard.models.submissions import (
     Evaluation,

@@ -183,3 +183,19 @@ class ApiToken(AbstractAuthToken):
             Scope.PUBLISH: self.may_publish,
         }
         return tuple(scope.value for scope, is_granted in granted.items() if is_granted)
+
+
+class AccountChange(models.Model):
+    """A change of how a person signs in, kept so that its owner can undo it."""
+
+    user = models.ForeignKey(User, on_delete=models.CASCADE, related_name="changes")
+    at = models.DateTimeField(default=timezone.now)
+    what = models.CharField(max_length=60, help_text="The name of the mail that told of it.")
+    before = models.JSONField(help_text="The proved addresses before it, the primary one first.")
+    undone_at = models.DateTimeField(null=True, blank=True)
+
+    class Meta:
+        indexes = [models.Index(fields=["user", "at"], name="changes_of_an_account")]
+
+    def __str__(self) -> str:
+        return f"{self.what} of {self.at:%Y-%m-%d}"

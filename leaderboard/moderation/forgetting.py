@@ -24,7 +24,7 @@ from leaderboard.models import (
     User,
 )
 from leaderboard.moderation.hiding import masked
-from leaderboard.people import teams
+from leaderboard.people import sessions, teams
 from leaderboard.quotas import mailboxes
 
 # Addresses below it exist nowhere (RFC 2606).
@@ -90,6 +90,10 @@ def export(*, user: User) -> dict[str, Any]:
             {"team": str(row.team_id), "created_at": _moment(row.created_at)}
             for row in Invitation.objects.filter(Q(created_by=user) | Q(accepted_by=user))
         ],
+        "changes_of_the_account": [
+            {"at": _moment(row.at), "what": row.what, "addresses_before": row.before}
+            for row in user.changes.order_by("at")
+        ],
         "mails_not_wanted": user.muted_kinds.split(),
         "audit_log": [
             {"at": _moment(row.at), "action": row.verb, "object": row.noun, "id": row.noun_id}
@@ -126,7 +130,8 @@ def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> Non
         elif heir is not None and membership is not None and membership.is_owner:
             heir.is_owner = True
             heir.save(update_fields=["is_owner"])
-        _delete_rows(row)
+        known = _addresses_of(row)
+        _delete_rows(row, known=known)
         _blank(row)
         audit.record_of(
             row, "forgotten", actor=actor, details={"reason": reason, "team": str(team.pk) if team else None}
@@ -135,6 +140,8 @@ def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> Non
             board_versions.bump_for_methods(
                 Method.objects.filter(team=team).shown().values_list("pk", flat=True)
             )
+    # Sign-ins and sign-ups keep addresses in sessions, also in those of others.
+    sessions.end_all(user=row, addresses=known)
 
 
 def delete_late_rows() -> None:
@@ -143,11 +150,18 @@ def delete_late_rows() -> None:
         model.objects.filter(user__is_active=False, user__email__endswith=f"@{NOWHERE}").delete()
 
 
-def _delete_rows(user: User) -> None:
+def _addresses_of(user: User) -> list[str]:
+    """Return the present and the former addresses of an account."""
+    present = EmailAddress.objects.filter(user=user).values_list("email", flat=True)
+    former = [address for row in user.changes.all() for address in row.before]
+    return sorted({user.email, *present, *former})
+
+
+def _delete_rows(user: User, *, known: list[str]) -> None:
     ApiToken.objects.filter(user=user).delete()
     Invitation.objects.filter(created_by=user).delete()
-    addresses = [user.email, *EmailAddress.objects.filter(user=user).values_list("email", flat=True)]
-    Mail.objects.filter(Q(user=user) | Q(recipient__in=addresses)).delete()
+    user.changes.all().delete()
+    Mail.objects.filter(Q(user=user) | Q(recipient__in=known)).delete()
     EmailAddress.objects.filter(user=user).delete()
     Authenticator.objects.filter(user=user).delete()
     SocialAccount.objects.filter(user=user).delete()

@@ -17,9 +17,9 @@ from leaderboard.db import clock
 from leaderboard.mails import notices, outbox
 from leaderboard.methods import visibility
 from leaderboard.models import Evaluation, SweepBeat
-from leaderboard.moderation import forgetting
+from leaderboard.moderation import forgetting, takeovers
 from leaderboard.ops import health, rate_limits
-from leaderboard.people import addresses
+from leaderboard.people import addresses, sessions
 from leaderboard.queue import lifecycle, worker
 from leaderboard.quotas import mailboxes
 from leaderboard.statistics import analyses
@@ -88,6 +88,8 @@ def clean(*, now: datetime) -> None:
     mailboxes.delete_expired(now=now)
     forgetting.delete_late_rows()
     addresses.delete_unproved(now=now)
+    takeovers.delete_old(now=now)
+    sessions.clear_expired()
     n_files = n_bytes = n_leftovers = 0
     faults: list[OSError] = []
     for orphan in orphans.orphans(now=now):

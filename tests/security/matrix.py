@@ -215,7 +215,10 @@ LINES: dict[str, Line] = {
     # All have a password, and are led to it.
     "account_reauthenticate_by_code": line(GET=SENT_ON, POST=SENT_ON),
     "account_email": line(GET=SIGNED_IN, POST="in 302 302 302 302 in in"),
-    "account_email_verification_sent": line(GET=OPEN),
+    # To visitors only while they sign up.
+    "account_email_verification_sent": line(GET="302 200 200 200 200 302 302"),
+    # Whoever has the link of the mail takes the account back; this one is none.
+    "account_undo": line(GET=all_of("410"), POST=all_of("410"), at={"secret": "nonsense"}),
     "account_change_password": line(GET=SIGNED_IN, POST=SIGNED_IN),
     "account_set_password": line(GET="in 302 302 302 302 in in", POST="in 302 302 302 302 in in"),
     "account_reset_password": line(GET=OPEN, POST=OPEN),

@@ -217,6 +217,7 @@ def test_forms_take_any_text(
     browser = Client(raise_request_exception=False)
     if not path.startswith("/accounts/"):
         browser.force_login(owner)
+        browser.post("/accounts/reauthenticate/", {"password": "correct horse", "next": path})
     for name in SOME:
         sent = {field: raw(name) if value is None else value for field, value in form.items()}
         response = browser.post(path, sent)

@@ -18,6 +18,7 @@ from allauth.core.internal import ratelimit
 from allauth.mfa.adapter import DefaultMFAAdapter
 from allauth.mfa.models import Authenticator
 from django.conf import settings
+from django.contrib.auth.base_user import AbstractBaseUser
 from django.contrib.auth.hashers import make_password
 from django.contrib.auth.models import AnonymousUser
 from django.contrib.sites.requests import RequestSite
@@ -29,10 +30,13 @@ from django.utils import timezone
 
 from leaderboard.mails import outbox
 from leaderboard.models import MailKind, User
+from leaderboard.moderation import takeovers
 from leaderboard.people import addresses, second_factor
 from leaderboard.web.account import identity
 
 KNOWN_ADDRESS_S = 90 * 24 * 3600
+# What a request keeps of the addresses that the account had when it began.
+PROVED_BEFORE = "proved_before"
 
 
 class ConfiguredSite(RequestSite):
@@ -73,13 +77,16 @@ class AccountAdapter(DefaultAccountAdapter):
 
     def pre_authenticate(self, request: HttpRequest, **credentials: Any) -> None:
         """Count one try. Raises allauth's validation error after too many, and after fewer wrong ones."""
-        super().pre_authenticate(request, **credentials)
-        login = _login_of(credentials)
+        self._count_wrong(request, **credentials)
         key = self._get_login_attempts_cache_key(request, **credentials)
         # A right password costs as much of the processor as a wrong one.
         if not ratelimit.consume(request, app="allauth.account", action="login_tried", key=key):
             self._rollback_login_failed_rl_usage()
             raise self.validation_error("too_many_logins")
+
+    def _count_wrong(self, request: HttpRequest, **credentials: Any) -> None:
+        super().pre_authenticate(request, **credentials)
+        login = _login_of(credentials)
         if cache.get(known_address_key(login, ratelimit.get_ip(request))):
             return
         usage = ratelimit.consume(request, app="allauth.account", action="login_failed_anywhere", key=login)
@@ -94,7 +101,7 @@ class AccountAdapter(DefaultAccountAdapter):
         if user and addresses.is_unconfirmed(user):
             # Whoever made it needs to show that the address is theirs, and is told what a wrong password is
             # told: else anybody could sign up with an address, sign in, and learn whether it was free.
-            self.pre_authenticate(request, **credentials)
+            self._count_wrong(request, **credentials)
             _remind(user)
             return None
         if user:
@@ -112,8 +119,34 @@ class AccountAdapter(DefaultAccountAdapter):
     def confirm_email(self, request: HttpRequest, email_address: EmailAddress) -> bool:
         # An unconfirmed account may have given way meanwhile.
         with transaction.atomic():
-            is_there = User.objects.select_for_update(no_key=True).filter(pk=email_address.user_id)
-            return is_there.exists() and bool(super().confirm_email(request, email_address))
+            user = User.objects.select_for_update(no_key=True).filter(pk=email_address.user_id).first()
+            before = takeovers.proved(user) if user else []
+            is_confirmed = user is not None and bool(super().confirm_email(request, email_address))
+        if user and is_confirmed and before:
+            self._tell("account/email/email_added", user, before, {"added_email": email_address.email})
+        return is_confirmed
+
+    def send_notification_mail(
+        self,
+        template_prefix: str,
+        user: AbstractBaseUser,
+        context: dict[str, Any] | None = None,
+        email: str | None = None,
+    ) -> None:
+        """Tell every address that the account had within a week, each with a link to take it back."""
+        if not isinstance(user, User):
+            return
+        before = getattr(allauth_context.request, PROVED_BEFORE, None) or takeovers.proved(user)
+        if before:
+            self._tell(template_prefix, user, before, context or {})
+        else:
+            super().send_notification_mail(template_prefix, user, context, email)
+
+    def _tell(self, template_prefix: str, user: User, before: list[str], context: dict[str, Any]) -> None:
+        now = timezone.now()
+        what = template_prefix.rpartition("/")[2]
+        for address, link in takeovers.note(user=user, what=what, before=before, now=now).items():
+            self.send_mail(template_prefix, address, {"timestamp": now, **context, "undo_url": link})
 
     def get_reauthentication_methods(self, user: User | AnonymousUser) -> list[dict[str, Any]]:
         # By code alone where there is one: a known password shows no recovery codes.

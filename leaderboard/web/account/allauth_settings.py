@@ -20,6 +20,9 @@ SETTINGS: Final[dict[str, Any]] = {
         "signup": f"{_HERE}.accounts.SignupForm",
         "confirm_email_verification_code": f"{_HERE}.accounts.ConfirmAddressForm",
         "reset_password": f"{_HERE}.accounts.ResetPasswordForm",
+        "reset_password_from_key": f"{_HERE}.password_forms.ResetPasswordKeyForm",
+        "change_password": f"{_HERE}.password_forms.ChangePasswordForm",
+        "set_password": f"{_HERE}.password_forms.SetPasswordForm",
     },
     # Sign-ins, wrong passwords and wrong codes; the keys are an account at an address, and an account (see
     # accounts.py and codes.py).

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 from uuid import UUID
 
+from allauth.account.adapter import get_adapter
+from allauth.account.decorators import reauthentication_required
 from django import forms
 from django.contrib import messages
 from django.core.exceptions import ValidationError
@@ -16,7 +18,7 @@ from django.views.decorators.http import require_safe
 
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Evaluation, Method, Submission, Team, User
-from leaderboard.moderation import forgetting, hiding
+from leaderboard.moderation import forgetting, hiding, takeovers
 from leaderboard.moderation.hiding import MAX_REASON
 from leaderboard.people import teams, tokens
 from leaderboard.people.names import MAX_NAME
@@ -80,6 +82,21 @@ class MoveForm(ActionForm):
     field_order = ("name", "reason")
 
 
+class GiveBackForm(ActionForm):
+    address = forms.EmailField(
+        label="Email address of the owner",
+        help_text="The account then has this address alone. Check first that the account is theirs.",
+        error_messages={"required": "No address was given; expected that of the owner of the account."},
+        widget=forms.EmailInput(attrs={"autocomplete": "off"}),
+    )
+
+    field_order = ("address", "reason")
+
+    def clean_address(self) -> str:
+        address: str = get_adapter().clean_email(self.cleaned_data["address"].lower())
+        return address
+
+
 MAX_ENTRIES: Final = 200
 _RENAMED: Final = (
     "The new name replaces the old one on all boards, including those of earlier dates, in exports, feeds, "
@@ -99,6 +116,8 @@ class Action:
     form: type[ActionForm]
     do: Callable[..., object]
     destroys: bool = False
+    # Whether the maintainer must have confirmed within some minutes who they are.
+    asks_who: bool = False
 
 
 def _move(*, subject: Method, name: str, now: object, **arguments: Any) -> None:
@@ -206,6 +225,19 @@ ACTIONS: Final[Mapping[str, Action]] = {
         ActionForm,
         lambda subject, now, **arguments: hiding.set_active(user=subject, is_active=True, **arguments),
     ),
+    "give-back-account": Action(
+        User,
+        "Give the account back",
+        "For an account that someone else took over. The address below becomes its only one. The password, "
+        "all sessions, API tokens, two-factor authentication and connected accounts end. We email the owner "
+        "how to choose a new password, and tell the former addresses.",
+        "Give account back",
+        "The account is given back.",
+        GiveBackForm,
+        lambda subject, **arguments: takeovers.give_back(user=subject, **arguments),
+        destroys=True,
+        asks_who=True,
+    ),
     "revoke-tokens": Action(
         User,
         "Revoke the API tokens of the person",
@@ -270,11 +302,18 @@ def action(request: HttpRequest, action_name: str, subject_id: str) -> HttpRespo
         with form.refusals():
             given = {name: value for name, value in form.cleaned_data.items() if name != "confirm"}
             arguments = {**given, "actor": maintainer_of(request), "now": timezone.now()}
-            chosen.do(subject=subject, **arguments)
+            (_confirmed if chosen.asks_who else _done)(request, chosen, subject, arguments)
             messages.success(request, chosen.done)
             return redirect("maintain_team", team.pk) if team else redirect("maintain_teams")
     about = {"action": chosen, "subject": _name_of(subject), "team": team}
     return form_page(request, "maintain/action.html", form, **about)
+
+
+def _done(request: HttpRequest, chosen: Action, subject: Any, arguments: Mapping[str, Any]) -> None:
+    chosen.do(subject=subject, **arguments)
+
+
+_confirmed = reauthentication_required(_done)
 
 
 def _team_of(subject: Team | Method | Submission | User) -> Team | None:

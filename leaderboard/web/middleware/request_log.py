@@ -17,8 +17,8 @@ from leaderboard.web.middleware import monitoring_host
 # Asked every few seconds by machines; worth a line only when they fail.
 QUIET = monitoring_host.ADDRESSES
 
-# What comes behind this is the secret of an invitation.
-SECRET_PATH = re.compile(r"^(/team/join/).+", re.DOTALL)
+# What comes behind this is the secret of an invitation, or of a mail to the owner of an account.
+SECRET_PATH = re.compile(r"^(/team/join/|/accounts/undo/|/accounts/password/reset/key/).+", re.DOTALL)
 
 
 class RequestLogMiddleware(RequestMiddleware):

@@ -14,7 +14,7 @@ from tests.leaderboard.web.test_every_page import assert_sound
 
 BY_PASSWORD, BY_CODE = "/accounts/reauthenticate/", "/accounts/reauthenticate/code/"
 EMAIL = "/accounts/email/"
-TOKEN = {"name": "CI", "scopes": ["read"], "split": "", "days": "365"}
+TOKEN: dict[str, object] = {"name": "CI", "scopes": ["read"], "split": "", "days": "365"}
 # Each door, as it is posted by a session that nobody has confirmed.
 DOORS: dict[str, tuple[str, dict[str, object]]] = {
     "add": (EMAIL, {"action_add": "", "email": "evil@example.org"}),

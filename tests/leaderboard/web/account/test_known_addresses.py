@@ -50,7 +50,7 @@ def answers(email: str, *steps: tuple[str, dict[str, str] | None]) -> list[Any]:
 SIGNING_UP = ("/accounts/signup/", {"email": "EMAIL", "password1": EVIL, "password2": EVIL, "name": "x"})
 SIGNING_IN = (SIGN_IN, {"login": "EMAIL", "password": EVIL})
 WRONG = (CONFIRM, {"code": "BBBB-BBBB"})
-WAYS = {
+WAYS: dict[str, list[tuple[str, dict[str, str] | None]]] = {
     "sign-up, page, resend, wrong codes": [
         SIGNING_UP,
         (CONFIRM, None),

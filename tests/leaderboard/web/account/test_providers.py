@@ -172,9 +172,9 @@ def test_without_a_password_a_mailed_code_is_asked_for_before_providers_change(
     client.get(BY_CODE)
     client.post(BY_CODE, {"code": code_in(mail.outbox[-1])})
     assert SocialAccount.objects.filter(user=owner).count() == 2
-    found = Client()
-    found.force_login(owner)
-    refused = found.post("/accounts/3rdparty/", {"account": kept.pk})
+    browser = Client()
+    browser.force_login(owner)
+    refused = browser.post("/accounts/3rdparty/", {"account": kept.pk})
     assert refused.headers["Location"].startswith(BY_CODE)
     assert SocialAccount.objects.filter(user=owner).count() == 2
 

@@ -1,0 +1,348 @@
+"""An account that was taken over comes back to its owner, by a mailed link or by a maintainer."""
+
+import re
+from datetime import timedelta
+
+import pytest
+from allauth.account.models import EmailAddress
+from allauth.mfa.models import Authenticator
+from allauth.socialaccount.models import SocialAccount
+from django.contrib.sessions.models import Session
+from django.core import mail
+from django.test import Client
+from django.utils import timezone
+from pytest_django import Settings
+
+from leaderboard.errors.refusals import NotMaintainer, Refused
+from leaderboard.models import AccountChange, ApiToken, AuditEvent, Mail, User
+from leaderboard.moderation import forgetting, takeovers
+from leaderboard.people import addresses
+from tests import builders
+from tests.leaderboard.web.account.proving import CONFIRM, code_in, confirm, proving, sign_up
+from tests.leaderboard.web.test_every_page import assert_sound
+
+EMAIL = "/accounts/email/"
+EVIL = "evil@example.org"
+DAY = timedelta(days=1)
+
+
+@pytest.fixture(autouse=True)
+def _proving(settings: Settings, benchmark: None) -> None:
+    proving(settings)
+
+
+@pytest.fixture
+def victim(owner: User) -> User:
+    for email in (owner.email, "second@example.org"):
+        EmailAddress.objects.create(user=owner, email=email, verified=True, primary=email == owner.email)
+    return owner
+
+
+def thief(user: User) -> Client:
+    """A browser of a person who knows the password."""
+    client = Client()
+    client.force_login(user)
+    confirm(client)
+    return client
+
+
+def add(client: Client, email: str = EVIL) -> None:
+    client.post(EMAIL, {"action_add": "", "email": email})
+    code = next(code_in(each) for each in reversed(mail.outbox) if each.to == [email])
+    client.post(CONFIRM, {"code": code})
+    assert EmailAddress.objects.get(email=email).verified
+
+
+def make_primary(client: Client, email: str = EVIL) -> None:
+    client.post(EMAIL, {"action_primary": "", "email": email})
+    assert EmailAddress.objects.get(email=email).primary
+
+
+def remove(client: Client, email: str) -> None:
+    client.post(EMAIL, {"action_remove": "", "email": email})
+    assert not EmailAddress.objects.filter(email=email).exists()
+
+
+def links_to(email: str) -> list[str]:
+    """The links that were mailed to an address, the oldest first."""
+    bodies = [str(message.body) for message in mail.outbox if message.to == [email]]
+    return [
+        match for body in bodies for match in re.findall(r"http://127.0.0.1:8000(/accounts/undo/\S+)", body)
+    ]
+
+
+def follow(link: str, **fields: object) -> int:
+    return Client().post(link, fields).status_code
+
+
+def addresses_of(user: User) -> list[str]:
+    """The proved addresses, the primary one first; the account's own is the same."""
+    user.refresh_from_db()
+    emails = takeovers.proved(user)
+    assert emails[0] == user.email
+    return emails
+
+
+def age(by: timedelta) -> None:
+    """Let time pass, for everything that was changed so far."""
+    for row in AccountChange.objects.all():
+        AccountChange.objects.filter(pk=row.pk).update(at=row.at - by)
+
+
+def take_over(client: Client, user: User) -> None:
+    """Every step by which an account changes hands."""
+    old = user.email
+    add(client)
+    make_primary(client)
+    remove(client, old)
+    remove(client, "second@example.org")
+    word = "evil-password-77"
+    client.post(
+        "/accounts/password/change/",
+        {"oldpassword": "correct horse", "password1": word, "password2": word},
+    )
+
+
+@pytest.mark.parametrize("number", range(5))
+@pytest.mark.parametrize("former", ["owner@example.org", "second@example.org"])
+def test_every_former_address_can_take_the_account_back_by_each_of_its_mails(
+    victim: User, former: str, number: int
+) -> None:
+    client = thief(victim)
+    take_over(client, victim)
+    builders.token(victim)
+    Authenticator.objects.create(user=victim, type="totp", data={"secret": "A" * 32})
+    SocialAccount.objects.create(user=victim, provider="github", uid="666")
+    assert len(links_to(former)) == 5
+    assert client.get("/submissions/").status_code == 200
+    page = assert_sound(Client().get(links_to(former)[number])).one("main").text
+    assert former in page
+    assert addresses_of(victim) == [EVIL], "looking changes nothing"
+    mail.outbox.clear()
+    done = Client().post(links_to_first(victim, former, number))
+    assert done.headers["Location"] == "/accounts/password/reset/done/"
+    assert addresses_of(victim) == ["owner@example.org", "second@example.org"]
+    assert not victim.has_usable_password()
+    assert client.get("/submissions/").status_code == 302
+    assert not ApiToken.objects.filter(user=victim, revoked_at=None).exists()
+    assert not Authenticator.objects.filter(user=victim).exists()
+    assert not SocialAccount.objects.filter(user=victim).exists()
+    [reset] = [each for each in mail.outbox if "/accounts/password/reset/key/" in str(each.body)]
+    assert reset.to == [former]
+    recipients = set(Mail.objects.filter(ended_at=None).values_list("recipient", flat=True))
+    assert recipients == {"owner@example.org", "second@example.org", EVIL}
+    assert AuditEvent.objects.filter(verb="recovered", noun_id=str(victim.pk)).count() == 1
+
+
+def links_to_first(user: User, former: str, number: int) -> str:
+    """The link of the mail with this number, made again: mails were cleared."""
+    change = AccountChange.objects.filter(user=user).order_by("pk")[number]
+    return takeovers._link(change, former).removeprefix("http://127.0.0.1:8000")
+
+
+def test_a_link_works_once_and_none_of_the_thief_works_after_it(victim: User) -> None:
+    client = thief(victim)
+    take_over(client, victim)
+    own, other, evil = links_to("owner@example.org"), links_to("second@example.org"), links_to(EVIL)
+    assert evil, "the account had this address, too"
+    assert follow(own[-1]) == 302
+    assert [follow(link) for link in [*own, *other, *evil]] == [410] * len([*own, *other, *evil])
+    assert addresses_of(victim) == ["owner@example.org", "second@example.org"]
+
+
+def test_the_thief_cannot_be_first_with_a_link_of_their_own(victim: User) -> None:
+    client = thief(victim)
+    add(client)
+    make_primary(client)
+    # The owner's addresses are still there: there is nothing for the thief to bring back.
+    assert [follow(link) for link in links_to(EVIL)] == [410] * len(links_to(EVIL))
+    remove(client, "owner@example.org")
+    remove(client, "second@example.org")
+    for link in links_to(EVIL):
+        follow(link)
+    assert follow(links_to("owner@example.org")[0]) == 302
+    assert addresses_of(victim) == ["owner@example.org", "second@example.org"]
+    assert [follow(link) for link in links_to(EVIL)] == [410] * len(links_to(EVIL))
+
+
+def test_the_owner_who_throws_the_thief_out_is_not_thrown_out_by_a_link(victim: User) -> None:
+    client = thief(victim)
+    add(client)
+    remove(client, EVIL)
+    assert links_to(EVIL)
+    assert [follow(link) for link in links_to(EVIL)] == [410] * len(links_to(EVIL))
+    assert addresses_of(victim) == ["owner@example.org", "second@example.org"]
+
+
+def test_what_was_given_up_more_than_a_week_ago_comes_back_to_nobody(victim: User) -> None:
+    client = thief(victim)
+    add(client, "new@example.org")
+    make_primary(client, "new@example.org")
+    remove(client, "owner@example.org")
+    given_up = links_to("owner@example.org")
+    age(6 * DAY)
+    remove(client, "second@example.org")
+    later = links_to("owner@example.org")
+    assert len(later) == len(given_up) + 1, "within the week, it is told"
+    age(2 * DAY)
+    add(client)
+    make_primary(client)
+    assert links_to("owner@example.org") == later
+    assert [follow(link) for link in later] == [410] * len(later)
+    # Nor does another address bring it back.
+    assert follow(links_to("second@example.org")[-1]) == 302
+    assert "owner@example.org" not in addresses_of(victim)
+    assert EVIL not in addresses_of(victim)
+
+
+def test_steps_days_apart_are_undone_together(victim: User) -> None:
+    client = thief(victim)
+    add(client)
+    for step in ("primary", "owner@example.org", "second@example.org"):
+        age(6 * DAY)
+        make_primary(client) if step == "primary" else remove(client, step)
+    assert follow(links_to("second@example.org")[-1]) == 302
+    assert EVIL not in addresses_of(victim)
+
+
+def test_one_may_choose_from_which_change_on(victim: User) -> None:
+    client = thief(victim)
+    add(client, "new@example.org")
+    own_change = AccountChange.objects.get()
+    add(client)
+    remove(client, "new@example.org")
+    link = links_to("owner@example.org")[-1]
+    assert own_change.pk != AccountChange.objects.order_by("pk")[1].pk
+    assert follow(link, since=AccountChange.objects.order_by("pk")[1].pk) == 302
+    assert addresses_of(victim) == ["owner@example.org", "second@example.org", "new@example.org"]
+
+
+def test_an_owner_who_has_another_account_by_now_reads_so(victim: User) -> None:
+    client = thief(victim)
+    take_over(client, victim)
+    other = User.objects.create_user("owner@example.org", "x")
+    EmailAddress.objects.create(user=other, email=other.email, verified=True, primary=True)
+    refused = Client().post(links_to("owner@example.org")[-1])
+    assert refused.status_code == 422
+    assert "Another account has this address now" in refused.text
+    assert addresses_of(victim) == [EVIL]
+    # The other address takes it back, without the one that has gone.
+    assert follow(links_to("second@example.org")[-1]) == 302
+    assert addresses_of(victim) == ["second@example.org"]
+    assert addresses_of(other) == ["owner@example.org"]
+
+
+def test_an_app_that_was_there_before_stays(victim: User) -> None:
+    Authenticator.objects.create(user=victim, type="totp", data={"secret": "A" * 32})
+    Authenticator.objects.update(created_at=timezone.now() - DAY)
+    before = [victim.email, "second@example.org"]
+    links = takeovers.note(user=victim, what="password_changed", before=before, now=timezone.now())
+    assert follow(links[victim.email].removeprefix("http://127.0.0.1:8000")) == 302
+    assert Authenticator.objects.filter(user=victim).count() == 1
+
+
+def test_a_sign_in_that_has_begun_ends_as_well(victim: User, settings: Settings) -> None:
+    Authenticator.objects.create(user=victim, type="totp", data={"secret": "A" * 32})
+    waiting = Client()
+    led = waiting.post("/accounts/login/", {"login": victim.email, "password": "correct horse"})
+    assert led.headers["Location"] == "/accounts/2fa/authenticate/"
+    links = takeovers.note(user=victim, what="x", before=[victim.email], now=timezone.now())
+    assert follow(links[victim.email].removeprefix("http://127.0.0.1:8000")) == 302
+    assert waiting.get("/accounts/2fa/authenticate/").status_code == 302
+
+
+@pytest.mark.parametrize("secret", ["x", "x:y:z", "W10:1abc:xyz", "%00", "ä"])
+def test_links_that_are_none_say_so(secret: str) -> None:
+    answer = Client().get(f"/accounts/undo/{secret}/")
+    assert answer.status_code == 410
+    assert_sound(answer)
+
+
+# --- what a maintainer does ------------------------------------------------------------------------------
+
+
+def test_a_maintainer_gives_an_account_back_and_confirms_who_they_are(victim: User, maintainer: User) -> None:
+    client = thief(victim)
+    take_over(client, victim)
+    builders.token(victim)
+    Authenticator.objects.create(user=victim, type="totp", data={"secret": "A" * 32})
+    SocialAccount.objects.create(user=victim, provider="github", uid="666")
+    path = f"/maintain/actions/give-back-account/{victim.pk}/"
+    fields = {"address": "Owner@Example.org", "reason": "Showed that the repository of the method is theirs."}
+    keeper = Client()
+    keeper.force_login(maintainer)
+    assert_sound(keeper.get(path))
+    asked = keeper.post(path, fields)
+    assert asked.headers["Location"].startswith("/accounts/reauthenticate/")
+    assert addresses_of(victim) == [EVIL]
+    confirm(keeper)
+    assert keeper.post(path, fields).headers["Location"].startswith("/maintain/teams/")
+    assert addresses_of(victim) == ["owner@example.org"]
+    assert not victim.has_usable_password()
+    assert client.get("/submissions/").status_code == 302
+    assert not ApiToken.objects.filter(user=victim, revoked_at=None).exists()
+    assert not Authenticator.objects.filter(user=victim).exists()
+    assert not SocialAccount.objects.filter(user=victim).exists()
+    event = AuditEvent.objects.get(verb="given back")
+    assert event.actor == maintainer
+    assert "example.org" not in str(event.details)
+    recipients = set(Mail.objects.filter(ended_at=None).values_list("recipient", flat=True))
+    assert recipients == {"owner@example.org", EVIL}
+    every_link = [*links_to("owner@example.org"), *links_to("second@example.org"), *links_to(EVIL)]
+    assert [follow(link) for link in every_link] == [410] * len(every_link)
+
+
+def test_only_maintainers_give_accounts_back_and_not_those_of_maintainers(
+    victim: User, maintainer: User, stranger: User
+) -> None:
+    given = {"address": "x@example.org", "reason": "r", "now": timezone.now()}
+    for actor in (stranger, victim):
+        with pytest.raises(NotMaintainer):
+            takeovers.give_back(user=victim, actor=actor, **given)
+    with pytest.raises(Refused, match="maintainer's account"):
+        takeovers.give_back(user=maintainer, actor=maintainer, **given)
+    with pytest.raises(Refused, match="Another account"):
+        takeovers.give_back(user=victim, actor=maintainer, **{**given, "address": stranger.email})
+    client = Client()
+    client.force_login(stranger)
+    assert client.post(f"/maintain/actions/give-back-account/{victim.pk}/", given).status_code == 404
+
+
+# --- what is left ----------------------------------------------------------------------------------------
+
+
+def test_nothing_holds_the_addresses_of_a_deleted_person(victim: User, stranger: User) -> None:
+    client = thief(victim)
+    add(client, "new@example.org")
+    Client().post("/accounts/login/", {"login": victim.email, "password": "correct horse"})
+    typing = Client()
+    sign_up(typing, victim.email)
+    own = Client()
+    own.force_login(stranger)
+    confirm(own)
+    own.post(EMAIL, {"action_add": "", "email": victim.email})
+    other = Client()
+    other.force_login(victim)
+    other.post("/account/data/", {"email": victim.email})  # waits for the password, with what was typed
+    known = {victim.email, "second@example.org", "new@example.org"}
+    assert any(email in str(row.get_decoded()) for row in Session.objects.all() for email in known)
+    forgetting.forget(user=victim, reason="r", actor=victim, now=timezone.now())
+    left = [str(row.get_decoded()) for row in Session.objects.all()]
+    assert not [text for text in left if any(email in text for email in known)]
+    assert not AccountChange.objects.exists()
+    assert own.get("/submissions/").status_code == 200, "whoever typed it stays signed in"
+
+
+def test_changes_are_kept_for_thirty_days(victim: User) -> None:
+    now = timezone.now()
+    takeovers.note(user=victim, what="x", before=[victim.email], now=now)
+    takeovers.delete_old(now=now + 29 * DAY)
+    assert AccountChange.objects.exists()
+    takeovers.delete_old(now=now + 31 * DAY)
+    assert not AccountChange.objects.exists()
+
+
+def test_an_unproved_address_undoes_nothing(owner: User) -> None:
+    EmailAddress.objects.create(user=owner, email=owner.email, verified=False, primary=True)
+    assert takeovers.proved(owner) == []
+    assert addresses.are_proved()
