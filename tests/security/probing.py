@@ -186,7 +186,7 @@ def _published_of(counts: Floats, sums: Floats, *, rivals: Floats) -> Answers:
     ]
     for rival in rivals:
         differences = _published_differences(counts, sums, rival=rival, edition=edition)
-        answers = [(*answer, *found) for answer, found in zip(answers, differences, strict=True)]
+        answers = [(*answer, *difference) for answer, difference in zip(answers, differences, strict=True)]
     return answers
 
 
