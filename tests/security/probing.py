@@ -1,6 +1,6 @@
 """What one more submission tells of hidden labels, with two decimals and with the one that is published.
 
-    python -m tests.security.probing --readouts 6  the tables of docs/hidden-values.md, half an hour
+    python -m tests.security.probing --readouts 6  the tables of docs/hidden-values.md, ten minutes
     python -m tests.security.probing --quick       small ones
 
 File 0 is one of two files, `BASES`. *near* predicts 0.05 s for every sequence, which is below every true
