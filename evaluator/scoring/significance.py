@@ -20,6 +20,9 @@ LEAST_P: Final = 0.0001
 MIN_DEGREES: Final = 8.0
 """With fewer degrees of freedom nothing is said of a mean: too few units to know how much they vary."""
 
+MIN_DIFFERENT: Final = 6
+"""With fewer units that differ, or have an error, nothing is said: no sign flips give a p below 5%."""
+
 # Of the normal distribution's 97.5% point: what a difference must be to be found with a power of 80%.
 _DETECTABLE: Final = (1.959964 + 0.841621) / 1.959964
 

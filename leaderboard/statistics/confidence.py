@@ -50,6 +50,8 @@ MAX_DELAY = timedelta(minutes=1)
 MAX_UNREADABLE = 5
 # A worker that dies while it computes leaves the work to others after this time.
 CLAIM_S = 300.0
+# Raise it when ranges or intervals are computed in another way: workers then compute them again.
+_METHOD = 2
 # By the evaluation's id, of every column both ends, or None where there is no range.
 Ranges = dict[str, list[list[int] | None]]
 
@@ -140,7 +142,8 @@ class Entries:
 
     def _digest(self, lines: Sequence[str]) -> str:
         printed = sorted(map(repr, self.printed))
-        text = "\n".join([self.edition.ground_truth_id, self.edition.protocol, *printed, *sorted(lines)])
+        head = [f"method {_METHOD}", self.edition.ground_truth_id, self.edition.protocol]
+        text = "\n".join([*head, *printed, *sorted(lines)])
         return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
 
     @property

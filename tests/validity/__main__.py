@@ -1,6 +1,7 @@
 """Print the tables of `docs/validation.md`, or some by name: `python -m tests.validity coverage days`."""
 
 import argparse
+import itertools
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
@@ -49,6 +50,13 @@ RANKS_HEAD: Final = (
     "all ranges hold",
     "one range holds",
     "mean width",
+)
+DOMINATED_HEAD: Final = (
+    "methods",
+    "recordings",
+    "alike: all ranges hold",
+    "last worse by 15%: all ranges hold",
+    "last marked as possibly the best",
 )
 DAYS_HEAD: Final = (
     "recordings",
@@ -156,6 +164,22 @@ def odd_rows(n: int) -> Iterator[Row]:
             yield f"10, one odd: {name}", "no", n_recordings, "–", *_rank_cells(ranks)
 
 
+def dominated_rows(n: int) -> Iterator[Row]:
+    """The same where one recording has most of a method's error; how often a worse one is still marked."""
+    for n_methods, n_recordings in itertools.product((3, 8), (40, 150, 700)):
+        cells: list[str] = []
+        for worse in (None, 1.15):
+            ranks = fields.ranks_of(
+                worlds.dominated(n_methods=n_methods, worse=worse),
+                means=np.array([1.0] * (n_methods - 1) + [worse or 1.0]),
+                n_recordings=n_recordings,
+                n=n // 6,
+                rng=np.random.default_rng([n_methods, n_recordings]),
+            )
+            cells.append(percent(ranks.all_at_once, ranks.n))
+        yield n_methods, n_recordings, *cells, percent(ranks.last_marked, ranks.n)
+
+
 def _rank_cells(ranks: fields.Ranks) -> Row:
     return percent(ranks.all_at_once, ranks.n), percent(ranks.each, ranks.n), f"{ranks.mean_width:.1f}"
 
@@ -184,6 +208,7 @@ TABLES: Final[dict[str, tuple[Row, Callable[[int], Iterator[Row]]]]] = {
     "sequences": (("recordings", "ρ", "z-test by sequences"), sequences_rows),
     "ranks": (RANKS_HEAD, ranks_rows),
     "odd": (RANKS_HEAD, odd_rows),
+    "dominated": (DOMINATED_HEAD, dominated_rows),
     "days": (DAYS_HEAD, days_rows),
 }
 

@@ -18,11 +18,15 @@ Draw = Callable[[int, int, np.random.Generator], tuple[Floats, Floats]]
 
 @dataclass(frozen=True)
 class Ranks:
-    """How often the ranges of a column hold all true ranks at once, how often each does, and their width."""
+    """How often the ranges of a column hold all true ranks at once, how often each does, and their width.
+
+    `last_marked` is how often the last method is marked as possibly the best.
+    """
 
     all_at_once: float
     each: float
     mean_width: float
+    last_marked: float
     n: int
 
 
@@ -71,7 +75,7 @@ def ranks_of(
     everybody = means if quoted is None else np.append(means, quoted)
     lowest = 1 + (everybody[None, :] < means[:, None]).sum(axis=1)[:, None]
     highest = len(everybody) - (everybody[None, :] > means[:, None]).sum(axis=1)[:, None]
-    n_all = n_each = width = 0.0
+    n_all = n_each = width = n_marked = 0.0
     for chunk in chunks(n):
         sums, counts = draw(n_recordings, chunk, rng)
         computed = ranges.rank_ranges(
@@ -86,7 +90,8 @@ def ranks_of(
         n_all += is_inside.all(axis=0).sum()
         n_each += is_inside.mean(axis=0).sum()
         width += (computed.high - computed.low + 1).mean(axis=0).sum()
-    return Ranks(n_all / n, n_each / n, width / n, n)
+        n_marked += np.count_nonzero(computed.is_with_best[-1])
+    return Ranks(n_all / n, n_each / n, width / n, n_marked / n, n)
 
 
 def _quoted(value: float, counts: Floats) -> ranges.Quoted:

@@ -44,6 +44,24 @@ def in_days(per_day: int, rho: float, *, n_methods: int) -> Draw:
     return draw
 
 
+def dominated(*, n_methods: int, worse: float | None = None) -> Draw:
+    """Methods whose errors are 60 times as large in one recording, each in one of its own; all equally good.
+
+    With `worse` that is so of the last method alone, whose other errors are larger by this factor.
+    """
+    alike = in_days(1, 0.0, n_methods=n_methods)
+
+    def draw(n_recordings: int, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        sums, counts = alike(n_recordings, n, rng)
+        if worse is not None:
+            sums[-1] *= worse
+        for method in range(n_methods) if worse is None else [n_methods - 1]:
+            sums[method, rng.integers(0, n_recordings, n), np.arange(n)] *= 60
+        return sums, counts
+
+    return draw
+
+
 def day_model(per_day: int, rho: float) -> Model:
     """Two methods on recordings that come in days."""
     draw = in_days(per_day, rho, n_methods=2)

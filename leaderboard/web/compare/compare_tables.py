@@ -20,8 +20,8 @@ from leaderboard.web.charts import profile_chart, svg
 from leaderboard.web.compare.difference_matrix import (
     best_entry,
     difference_matrix,
+    findings,
     interval_of,
-    significant_pairs,
     tested_pairs,
 )
 from leaderboard.web.formatting import signed, with_bold_names
@@ -55,8 +55,10 @@ def verdict(compared: Compared) -> str:
     if len(compared.entries) == len(("first", "second")):
         return compared.pairs[0].sentence()
     best = best_entry(compared.entries)
-    tested = tested_pairs(compared)
-    worse, alike = _worse_and_alike(best, tested, significant_pairs(compared))
+    of_best = [pair for pair in tested_pairs(compared) if best in (pair.first, pair.second)]
+    sorted_out = findings(compared)
+    worse, here_alone = (_rivals(best, [pair for pair in of_best if pair in some]) for some in sorted_out)
+    alike = _rivals(best, [pair for pair in of_best if not any(pair in some for some in sorted_out)])
     head = (
         f"Of these {_NUMBERS[len(compared.entries)]}, {best.method} has the lowest "
         f"{metric_of(best.primary).symbol}, "
@@ -74,19 +76,21 @@ def verdict(compared: Compared) -> str:
         for relation, names in relations
         if names
     ]
-    together = f" (corrected for all {len(tested)} pairs)" if len(tested) > 1 else ""
-    lines = [head, f"It is {', and '.join(parts)}{together}."] if parts else [head]
+    lines = [head]
+    if parts:
+        lines.append(f"It is {', and '.join(parts)}{_together(compared)}.")
+    if here_alone:
+        names, together = get_text_list(here_alone, "and"), "" if parts else _together(compared)
+        lines.append(
+            f"Among these {_NUMBERS[len(compared.entries)]}, it is significantly better than {names}"
+            f"{together}; among all pairs of the board it is not, and {names} may be the best."
+        )
     return " ".join([*lines, *dict.fromkeys(pair.withheld for pair in compared.pairs if pair.withheld)])
 
 
-def _worse_and_alike(
-    best: Entry, tested: Sequence[Pair], significant: Sequence[Pair]
-) -> tuple[list[str], list[str]]:
-    """Return the methods that the best is significantly better than, and the others."""
-    of_best = [pair for pair in tested if best in (pair.first, pair.second)]
-    worse = [pair for pair in of_best if pair in significant]
-    alike = [pair for pair in of_best if pair not in significant]
-    return _rivals(best, worse), _rivals(best, alike)
+def _together(compared: Compared) -> str:
+    n_tested = len(tested_pairs(compared))
+    return f" (corrected for all {n_tested} pairs)" if n_tested > 1 else ""
 
 
 def _rivals(best: Entry, pairs: Sequence[Pair]) -> list[str]:

@@ -1,8 +1,8 @@
 """Three to five methods at a glance: the difference of every pair, and of all to the best on one scale."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Final, NamedTuple
 
 from django.utils.safestring import SafeString
 
@@ -13,6 +13,9 @@ from leaderboard.boards.rows import Entry
 from leaderboard.statistics.comparisons import Compared, Pair
 from leaderboard.web.charts import svg
 from leaderboard.web.formatting import signed
+
+_SIGNIFICANTLY: Final = "significantly {}"
+_HERE_ALONE: Final = "significantly {} among these methods, not among all of the board"
 
 
 class MatrixCell(NamedTuple):
@@ -51,24 +54,34 @@ def tested_pairs(compared: Compared) -> list[Pair]:
     return [pair for pair in compared.pairs if not pair.withheld and pair.difference is not None]
 
 
-def significant_pairs(compared: Compared) -> list[Pair]:
-    """Return the pairs that differ significantly, all of them tested together.
+class Findings(NamedTuple):
+    """The pairs that differ significantly, and those that do so among these methods alone."""
 
-    The best is chosen from the data, so no pair is tested alone. The board's marks and rank ranges outweigh
-    the test.
+    significant: list[Pair]
+    here_alone: list[Pair]
+
+
+def findings(compared: Compared) -> Findings:
+    """Sort out the pairs that differ significantly, all of them tested together.
+
+    The best is chosen from the data, so no pair is tested alone. The board tests more pairs at once: what it
+    still marks as possibly the best is worse among these methods alone.
     """
     best, tested = best_entry(compared.entries), tested_pairs(compared)
     apart = significant_together([pair.difference for pair in tested if pair.difference])
-    return [
-        pair for pair, is_apart in zip(tested, apart, strict=True) if _is_significant(pair, is_apart, best)
-    ]
+    sorted_out = Findings([], [])
+    for pair, is_apart in zip(tested, apart, strict=True):
+        better, worse = sorted((pair.first, pair.second), key=lambda entry: entry.value or 0.0)
+        may_be_best = better is best and worse.interval.is_with_best
+        if _is_apart_on_the_board(better, worse) or (is_apart and not may_be_best):
+            sorted_out.significant.append(pair)
+        elif is_apart:
+            sorted_out.here_alone.append(pair)
+    return sorted_out
 
 
-def _is_significant(pair: Pair, is_apart: bool, best: Entry) -> bool:
-    better, worse = sorted((pair.first, pair.second), key=lambda entry: entry.value or 0.0)
-    if (better.interval.rank_high or math.inf) < (worse.interval.rank_low or 0):
-        return True
-    return is_apart and not (best is better and worse.interval.is_with_best)
+def _is_apart_on_the_board(better: Entry, worse: Entry) -> bool:
+    return (better.interval.rank_high or math.inf) < (worse.interval.rank_low or 0)
 
 
 def difference_matrix(compared: Compared) -> Matrix | None:
@@ -81,9 +94,13 @@ def difference_matrix(compared: Compared) -> Matrix | None:
         if pair.difference is not None:
             differences[pair.first.id, pair.second.id] = pair.difference
             differences[pair.second.id, pair.first.id] = pair.difference.turned()
-    significant = {frozenset((pair.first.id, pair.second.id)) for pair in significant_pairs(compared)}
+    words = {
+        frozenset((pair.first.id, pair.second.id)): word
+        for word, pairs in zip((_SIGNIFICANTLY, _HERE_ALONE), findings(compared), strict=True)
+        for pair in pairs
+    }
     rows = tuple(
-        (row, tuple(_cell(row, column, differences, significant) for column in entries)) for row in entries
+        (row, tuple(_cell(row, column, differences, words) for column in entries)) for row in entries
     )
     n_tested = sum(each.p_below is not None for each in differences.values()) // 2
     return Matrix(rows, *_forest(entries, differences), n_tested)
@@ -93,7 +110,7 @@ def _cell(
     row: Entry,
     column: Entry,
     differences: Mapping[tuple[str, str], Difference],
-    significant: Collection[frozenset[str]],
+    words: Mapping[frozenset[str], str],
 ) -> MatrixCell:
     difference = differences.get((row.id, column.id))
     if difference is None:
@@ -101,10 +118,11 @@ def _cell(
     text = signed(difference.difference, decimals=row.decimals)
     if difference.p_below is None:
         return MatrixCell(text, hint="no test")
-    if frozenset((row.id, column.id)) not in significant:
+    word = words.get(frozenset((row.id, column.id)))
+    if word is None:
         return MatrixCell(text, hint="not significant")
     css = "better" if difference.difference < 0 else "worse"
-    return MatrixCell(text, css, f"significantly {css}")
+    return MatrixCell(text, css, word.format(css))
 
 
 def _forest(

@@ -1,7 +1,7 @@
 """Rank ranges of large boards stay what they are, to the last digit.
 
-`tests/golden/rank_ranges.json` has what an earlier program made of these boards, which kept all pairs and
-their maxima.
+`tests/golden/rank_ranges.json` has them; `python -m tests.evaluator.scoring.test_golden_ranges` records them
+again.
 """
 
 import hashlib
@@ -13,7 +13,8 @@ import pytest
 from evaluator.scoring.ranges import Quoted, RankRanges, rank_ranges
 from tests.services import REPOSITORY
 
-GOLDEN = json.loads((REPOSITORY / "tests" / "golden" / "rank_ranges.json").read_text())
+PATH = REPOSITORY / "tests" / "golden" / "rank_ranges.json"
+GOLDEN = json.loads(PATH.read_text())
 
 
 def board(*, n_entries: int, n_recordings: int, n_columns: int, step: float, n_quoted: int) -> RankRanges:
@@ -40,8 +41,16 @@ def digest(ranges: RankRanges) -> str:
     return hashlib.sha256(np.stack([ranges.low, ranges.high]).astype("<i8").tobytes()).hexdigest()
 
 
-@pytest.mark.parametrize("case", GOLDEN, ids=lambda case: case["board"]["n_entries"])
-def test_ranges_are_those_of_the_program_that_kept_all_pairs(case: dict[str, dict[str, int]]) -> None:
+def recorded(case: dict[str, dict[str, int]]) -> dict[str, object]:
     ranges = board(**case["board"])  # type: ignore[arg-type]  # as they are recorded
-    assert [ranges.low[:9, 0].tolist(), ranges.high[:9, 0].tolist()] == case["first"]
-    assert digest(ranges) == case["digest"]
+    first = [ranges.low[:9, 0].tolist(), ranges.high[:9, 0].tolist()]
+    return {"board": case["board"], "first": first, "digest": digest(ranges)}
+
+
+@pytest.mark.parametrize("case", GOLDEN, ids=lambda case: case["board"]["n_entries"])
+def test_ranges_of_large_boards_are_those_that_were_recorded(case: dict[str, dict[str, int]]) -> None:
+    assert recorded(case) == case
+
+
+if __name__ == "__main__":
+    PATH.write_text(json.dumps([recorded(case) for case in GOLDEN], indent=1) + "\n")

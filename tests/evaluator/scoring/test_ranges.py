@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from evaluator.scoring import ranges
+from evaluator.scoring.balance import tangents
 from evaluator.scoring.ranges import Quoted, rank_ranges
 from tests.evaluator.recordings import N_BAGS, Floats, sign_flip_p, some_sums
 
@@ -35,10 +36,17 @@ def ranges_of(sums: Floats, counts: Floats, papers: Papers | None = None) -> lis
     return [(int(a), int(b), bool(c)) for a, b, c in zip(*columns, strict=True)]
 
 
+def rarity_of(gaps: Floats, level: float) -> tuple[float, float]:
+    """Slope and offset of a pair's statistic, one pair at a time."""
+    squares = gaps[None] ** 2
+    tangent = tangents(squares, squares.sum(axis=1), (squares**2).sum(axis=1), level=level, noise=np.zeros(1))
+    return float(tangent.slope[0]), float(tangent.offset[0])
+
+
 def ranges_of_a_loop(
     sums: Floats, counts: Floats, papers: Papers | None = None, *, n_steps: int = 100
 ) -> list[tuple[int, int, bool]]:
-    """Step-down max-t over all ordered pairs, one after the other, as the paper has it.
+    """Step-down over all ordered pairs, one after the other, as the papers have it.
 
     A quoted row counts with its lower end where it may be worse, with its upper end where it may be better;
     two quoted rows are no pair.
@@ -54,20 +62,24 @@ def ranges_of_a_loop(
         value, half = (papers or [])[names.index(name) - len(sums)]
         return value + sign * half, (value + sign * half) * counts[:, 0]
 
-    t, draws = {}, {}
-    for worse, better in itertools.permutations(names, 2):
-        if isinstance(worse, str) and isinstance(better, str):
-            continue
+    pairs = [
+        (worse, better)
+        for worse, better in itertools.permutations(names, 2)
+        if isinstance(worse, int) or isinstance(better, int)
+    ]
+    level = float(stats.norm.isf(0.05 / len(pairs)))
+    observed, draws = {}, {}
+    for worse, better in pairs:
         (value, own), (other_value, other) = end(worse, -1), end(better, 1)
         gaps = own - other
-        error = float(np.sqrt((gaps**2).sum()))
-        t[worse, better] = gaps.sum() / error if value > other_value and error > 0 else 0.0
-        draws[worse, better] = signs @ gaps / error if error > 0 else np.zeros(len(signs))
-    family, rejected = set(t), set()
+        slope, offset = rarity_of(gaps, level) if (gaps != 0).sum() >= 6 else (0.0, 0.0)
+        observed[worse, better] = slope * gaps.sum() + offset if value > other_value else 0.0
+        draws[worse, better] = slope * (signs @ gaps) + offset
+    family, rejected = set(observed), set()
     for _ in range(n_steps):
         largest = np.max([draws[pair] for pair in family], axis=0)
         critical = np.quantile(largest, 0.95, method="higher")
-        newly_rejected = {pair for pair in family if t[pair] > critical}
+        newly_rejected = {pair for pair in family if observed[pair] > critical}
         if not newly_rejected:
             break
         rejected |= newly_rejected
@@ -84,6 +96,81 @@ def ranges_of_a_loop(
 def test_rank_ranges_are_those_of_a_plain_loop(step: float, papers: Papers) -> None:
     sums, counts = some_sums(20, n_entries=7, step=step)
     assert ranges_of(sums, counts, papers) == ranges_of_a_loop(sums, counts, papers)
+
+
+def one_dominates(seed: int, *, n_recordings: int = 150, n_dominating: int = 1) -> tuple[Floats, Floats]:
+    """Sums of three methods; the first fails in some recordings, and is worse in all others as well."""
+    rng = np.random.default_rng(seed)
+    counts = rng.integers(10, 60, (n_recordings, 1)).astype(float)
+    errors = rng.lognormal(0, 0.3, (3, n_recordings, 1)) * np.array([1.4, 1.0, 1.0])[:, None, None]
+    errors[0, :n_dominating] *= 60
+    return errors * counts, counts
+
+
+@pytest.mark.parametrize("n_dominating", [1, 2, 4])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_method_that_is_worse_everywhere_is_worse_where_few_recordings_have_most_of_its_error(
+    seed: int, n_dominating: int
+) -> None:
+    sums, counts = one_dominates(seed, n_dominating=n_dominating)
+    gaps = sums[0] - sums[1]
+    t = float(gaps.sum() / np.sqrt((gaps**2).sum()))
+    p = float(sign_flip_p(gaps, rng=np.random.default_rng(1))[0])
+    # The largest t that a pair with few dominating recordings can have is below every bound of several pairs.
+    assert t < 1.2 + n_dominating**0.5
+    assert p <= 0.0001 or n_dominating > 1
+    published = sums.sum(axis=1) / counts.sum(axis=0)
+    for signs in range(6):
+        computed = rank_ranges(
+            sums, published=published, usable=np.ones(1, dtype=bool), rng=np.random.default_rng(signs)
+        )
+        assert (computed.low[0, 0], computed.high[0, 0]) == (3, 3)
+
+
+def test_one_pair_with_dominating_recordings_takes_nothing_from_the_others() -> None:
+    """Their ranges are those of a board without that method, but for its rank."""
+    sums, counts = some_sums(26, n_entries=6, step=0.8)
+    alone = ranges_of(sums, counts)
+    failing = sums[-1:] * 1.3
+    failing[0, 0] += 1e4 * counts[0]
+    with_failing = ranges_of(np.concatenate([sums, failing]), counts)
+    assert with_failing[-1][:2] == (7, 7)
+    assert with_failing[:-1] == alone
+
+
+def test_a_difference_that_is_only_as_rare_as_the_bound_is_not_significant() -> None:
+    """Eight recordings, all differences alike: the observed sums are among the flipped ones."""
+    counts = np.ones((8, 1))
+    sums = np.arange(12.0)[:, None, None] * counts
+    published = np.arange(12.0)[:, None]
+    for seed in range(5):
+        computed = rank_ranges(
+            sums, published=published, usable=np.ones(1, dtype=bool), rng=np.random.default_rng(seed)
+        )
+        flips = (
+            np.random.default_rng(seed).integers(0, 2, (ranges.N_RANK_FLIPS, 8), dtype=np.int8).sum(axis=1)
+        )
+        is_rare = np.mean((flips == 0) | (flips == 8)) <= 0.05
+        assert bool((computed.low == computed.high).all()) == is_rare
+
+
+@pytest.mark.parametrize("n_different", [5, 6])
+def test_pairs_that_differ_in_fewer_than_six_recordings_are_never_distinguished(n_different: int) -> None:
+    counts = np.ones((40, 1))
+    first = 20 * counts
+    second = first.copy()
+    second[:n_different] += 100
+    assert ranges_of(np.stack([first, second]), counts) == (
+        [(1, 2, True)] * 2 if n_different == 5 else [(1, 1, True), (2, 2, False)]
+    )
+
+
+def test_an_entry_with_an_error_in_few_recordings_is_not_tested_against_a_paper() -> None:
+    counts = np.ones((40, 1))
+    for n_failing, expected in ((0, (1, 2, True)), (5, (1, 2, True)), (6, (1, 1, True))):
+        sums = np.zeros((1, 40, 1))
+        sums[0, :n_failing] = 0.01
+        assert ranges_of(sums, counts, [(3.0, 0.05)]) == [expected]
 
 
 def test_a_quoted_row_is_above_or_below_only_with_its_whole_rounding_interval() -> None:

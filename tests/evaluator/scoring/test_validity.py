@@ -93,6 +93,20 @@ def test_all_rank_ranges_hold_at_once_beside_a_quoted_row(n_methods: int, correl
     assert ranks.all_at_once >= 0.88 - margin(0.88, 100)
 
 
+@pytest.mark.parametrize("n_recordings", [40, 150])
+def test_rank_ranges_hold_where_one_recording_has_most_of_each_methods_error(n_recordings: int) -> None:
+    draw, rng = worlds.dominated(n_methods=6), np.random.default_rng([6, n_recordings])
+    ranks = fields.ranks_of(draw, means=np.ones(6), n_recordings=n_recordings, n=200, rng=rng)
+    assert ranks.all_at_once >= 0.95 - margin(0.95, 200)
+
+
+def test_a_worse_method_is_rarely_marked_as_best_because_one_recording_has_most_of_its_error() -> None:
+    """By a common bound of t, it was always marked."""
+    draw, means = worlds.dominated(n_methods=3, worse=1.15), np.array([1.0, 1.0, 1.15])
+    ranks = fields.ranks_of(draw, means=means, n_recordings=150, n=100, rng=np.random.default_rng(7))
+    assert ranks.last_marked <= 0.3
+
+
 def test_recordings_of_alike_days_need_days_as_units() -> None:
     """35 recordings a day whose levels correlate by 0.2: by recordings, intervals are too narrow."""
     model = worlds.day_model(35, 0.2)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
+from uuid import UUID
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from evaluator.scoring.ranges import rank_ranges
 from evaluator.scoring.significance import p_below
 from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.statistics.comparisons import Compared, Difference, Pair
-from leaderboard.web.compare import compare_tables
+from leaderboard.web.compare import compare_tables, difference_matrix
 from tests.validity import margin, worlds
 
 A, B, C = (
@@ -83,12 +84,38 @@ def test_a_class_of_p_counts_as_its_upper_end() -> None:
     )
 
 
-def test_no_method_is_called_worse_that_the_board_marks_as_possibly_best() -> None:
+def test_what_the_board_marks_as_possibly_best_is_worse_among_these_alone() -> None:
+    """A small p is never called "not significantly better": it is not, among the board's many pairs."""
     entries = with_range(A, 1, 2), with_range(B, 1, 3), with_range(C, 2, 3)
     sentence = compare_tables.verdict(compared(0.001, 0.001, 0.5, entries=entries))
     assert sentence.endswith(
-        "It is significantly better than C, and not significantly better than B (corrected for all 3 pairs)."
+        "It is significantly better than C (corrected for all 3 pairs). Among these three, it is "
+        "significantly better than B; among all pairs of the board it is not, and B may be the best."
     )
+    sentence = compare_tables.verdict(compared(0.001, 0.4, 0.5, entries=entries))
+    assert "It is not significantly better than C (corrected for all 3 pairs). Among" in sentence
+    both = with_range(A, 1, 2), with_range(B, 1, 3), with_range(C, 1, 3)
+    sentence = compare_tables.verdict(compared(0.0001, 0.001, 0.5, entries=both))
+    assert sentence.endswith(
+        "Among these three, it is significantly better than B and C (corrected for all 3 pairs); among all "
+        "pairs of the board it is not, and B and C may be the best."
+    )
+
+
+@pytest.mark.parametrize("below", [(), (0.001,) * 10])
+def test_no_pair_with_a_p_below_a_thousandth_is_called_not_significant(below: tuple[float, ...]) -> None:
+    entries = [
+        with_range(replace(A, method=name, scores={"mid": 10.0 + i}, method_id=UUID(int=i + 1)), 1, 60)
+        for i, name in enumerate("ABCDE")
+    ]
+    p = [None if below else 0.0009] * 10
+    page = compared(*p, entries=entries, below=below)
+    assert "not significantly" not in compare_tables.verdict(page)
+    matrix = difference_matrix.difference_matrix(page)
+    assert matrix is not None
+    hints = [cell.hint for _, cells in matrix.rows for cell in cells if cell.text]
+    assert len(hints) == 20
+    assert all(hint.startswith("significantly") for hint in hints)
 
 
 def test_methods_with_separate_rank_ranges_on_the_board_are_separate() -> None:
@@ -132,6 +159,7 @@ def test_among_equal_methods_a_winner_is_rarely_named_and_never_against_the_boar
             )
         ]
         worse = sentences[-1].partition("It is significantly better than ")[2].partition(", and not")[0]
+        worse = worse.partition(". Among these")[0]
         named = [entry for entry in entries if entry.method in worse]
         assert not any(entry.intervals["mid"].is_with_best for entry in named)
     share = sum("It is significantly better than" in each for each in sentences) / n
