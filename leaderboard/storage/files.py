@@ -103,7 +103,7 @@ class DurableFileSystemStorage(FileSystemStorage):
 
     @answering()
     def _open(self, name: str, mode: str = "rb") -> "File[bytes]":
-        opened = super()._open(name, mode)
+        opened = super()._open(name, mode)  # type: ignore[misc]  # the stubs lack it
         try:
             # A broken disk says so at the first read, when an answer may have begun already.
             os.pread(opened.fileno(), 1, 0)
