@@ -27,12 +27,16 @@ MAX_REASON: Final = 500
 def ensure_splits(*, split_model: Any = Split, result_model: Any = PublishedResult) -> None:
     """Make the benchmark's first splits and the rows of its paper where they are missing.
 
+    In production no simulated split is made: only `make demo` fills it.
+
     Rows of a new split are there since ever, later ones since now. A migration passes its own models.
     """
     benchmark, now = settings.BENCHMARK, timezone.now()
     made = set()
     with transaction.atomic():
         for position, first in enumerate(benchmark.splits):
+            if settings.PRODUCTION and first.is_simulated:
+                continue
             fields: dict[str, Any] = {
                 "position": position,
                 "decimals": 1 if first.is_hidden else 2,

@@ -112,6 +112,18 @@ def test_a_new_installation_begins_with_the_splits_of_the_file(
     assert not PublishedResult.objects.exists()
 
 
+@pytest.mark.parametrize("is_production", [True, False])
+def test_a_production_site_begins_without_the_simulated_split(
+    db: None, settings: Settings, is_production: bool
+) -> None:
+    PublishedResult.objects.all().delete()
+    Split.objects.all().delete()
+    settings.PRODUCTION = is_production
+    splits.ensure_splits()
+    assert Split.objects.filter(pk="demo").exists() != is_production
+    assert Split.objects.filter(pk="test").exists()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
