@@ -15,6 +15,7 @@ class LeaderboardConfig(AppConfig):
         from leaderboard.submissions import receipts  # noqa: PLC0415 - needs the models
 
         checks.register(receipts.check_keys)
+        checks.register(receipts.check_public_key, deploy=True)
         checks.register(texts.check_contact, deploy=True)
         checks.register(deployment.check_variables, deploy=True)
         checks.register(deployment.check_services, deploy=True)

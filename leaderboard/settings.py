@@ -50,6 +50,10 @@ SECRET_KEY = required("TSTTC_SECRET_KEY", embedded="", by={"web"}) or key_of_che
 RECEIPT_KEY = required("TSTTC_RECEIPT_KEY", embedded="", by={"web"}) or key_of_checkout(
     DATA_DIR / "receipt-key", token_urlsafe
 )
+# Only the web process has the key in production; what others have in its place is random.
+HAS_RECEIPT_KEY = not PRODUCTION or bool(env.str("TSTTC_RECEIPT_KEY", default=""))
+# What a backup writes of it, which therefore needs no key.
+RECEIPT_PUBLIC_KEY = env.str("TSTTC_RECEIPT_PUBLIC_KEY", default="")
 RECEIPT_OLD_KEYS = env.list("TSTTC_RECEIPT_OLD_KEYS", default=[])
 DEBUG = env.bool("TSTTC_DEBUG", default=False)
 ALLOWED_HOSTS = required("TSTTC_ALLOWED_HOSTS", embedded="*").split(",")
@@ -117,7 +121,7 @@ DATABASES = {
         required(
             "TSTTC_DATABASE_URL",
             embedded=f"sqlite:///{DATA_DIR / 'leaderboard.sqlite3'}",
-            by={"web", "worker", "migrate", "maintainer", "mailer"},
+            by=environment.PROCESSES,
             elsewhere="sqlite://:memory:",
         )
     )
@@ -222,12 +226,12 @@ if not 0 < HEARTBEAT_S < LEASE_S < WALL_S:
         "expected each to be shorter than the next."
     )
 SWEEP_S = env.float("TSTTC_SWEEP_S", default=15.0)
-# Two nights without a good backup; 0: nobody is told.
-MAX_BACKUP_AGE_H = env.float("TSTTC_MAX_BACKUP_AGE_H", default=50.0)
 # Without a broker nobody tells the workers, and somebody waits.
 POLL_S = env.float("TSTTC_POLL_S", default=5.0 if PRODUCTION else 0.5)
 # How often stored files that no submission names are removed (see leaderboard/upkeep/pollers.py).
 CLEAN_S = env.float("TSTTC_CLEAN_S", default=6 * 3600.0)
+# After a restore none is removed for so many days: a newer database may name it (see storage/ownership.py).
+KEEP_AFTER_RESTORE_D = env.float("TSTTC_KEEP_AFTER_RESTORE_D", default=56.0)
 BACKOFF_S = env.float("TSTTC_BACKOFF_S", default=2.0)
 # Limits of the child process that parses untrusted bytes.
 CHILD_MEMORY_BYTES = env.int("TSTTC_CHILD_MEMORY_BYTES", default=1_500_000_000)

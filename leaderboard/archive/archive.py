@@ -33,7 +33,10 @@ _PAGES: Final = ("rules", "licence")
 
 def make(*, into: str, now: datetime) -> Path:
     """Write an archive into a folder that is empty or new, and return it. Raises `NoBackup` and `OSError`."""
-    contents.require_receipt_key()
+    if not settings.HAS_RECEIPT_KEY:
+        raise NoBackup(
+            "TSTTC_RECEIPT_KEY is not set; expected it here, since an archive has signed receipts."
+        )
     folder = contents.folder_of(into)
     for path in [folder] if folder.is_file() else folder.glob("*"):
         raise NoBackup(f"There is {path}; expected an empty or a new folder.")

@@ -130,7 +130,7 @@ if PROFILE not in {"embedded", "production"}:
 PRODUCTION = PROFILE == "production"
 
 # Which process this is, so that none has to be given a secret that it has no use for.
-PROCESSES = ("web", "worker", "migrate", "maintainer", "mailer")
+PROCESSES = ("web", "worker", "migrate", "maintainer", "mailer", "backup")
 PROCESS: str = env.str("TSTTC_PROCESS", default="web")
 if PROCESS not in PROCESSES:
     raise ImproperlyConfigured(f"TSTTC_PROCESS is {PROCESS!r}; expected one of {', '.join(PROCESSES)}.")

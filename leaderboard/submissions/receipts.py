@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from django.conf import settings
-from django.core.checks import CheckMessage, Error
+from django.core.checks import CheckMessage, Error, Info
 from django.core.exceptions import ImproperlyConfigured
 
 from evaluator import receipts
@@ -13,6 +13,7 @@ from leaderboard.errors.refusals import Refused
 from leaderboard.models import Evaluation, Status, Submission
 from leaderboard.submissions.progress import evaluation_of
 
+PUBLIC_KEY: Final = "TSTTC_RECEIPT_PUBLIC_KEY"
 MEDIA_TYPE: Final = "application/jwt"
 
 
@@ -74,6 +75,15 @@ def public_keys() -> dict[str, Any]:
     return receipts.key_set([receipts.public_key(private_key()), *former])
 
 
+def known_public_keys() -> dict[str, Any]:
+    """Return the key set as far as this process knows it: one without the key may have its public half."""
+    if settings.HAS_RECEIPT_KEY:
+        return public_keys()
+    given = [_key(PUBLIC_KEY, settings.RECEIPT_PUBLIC_KEY)] if settings.RECEIPT_PUBLIC_KEY else []
+    former = [_key("TSTTC_RECEIPT_OLD_KEYS", text) for text in settings.RECEIPT_OLD_KEYS]
+    return receipts.key_set([*given, *former])
+
+
 def _key(name: str, text: str) -> bytes:
     try:
         key = receipts.decode(text.strip())
@@ -90,6 +100,21 @@ def _key(name: str, text: str) -> bytes:
 def check_keys(app_configs: Sequence[Any] | None = None, **kwargs: Any) -> list[CheckMessage]:
     try:
         public_keys()
+        known_public_keys()
     except ImproperlyConfigured as fault:
         return [Error(str(fault), id="leaderboard.E001")]
+    if not settings.HAS_RECEIPT_KEY:
+        return []
+    given, own = settings.RECEIPT_PUBLIC_KEY, receipts.encode(receipts.public_key(private_key()))
+    if given and given != own:
+        message = f"{PUBLIC_KEY} is {given!r}; expected {own!r}, the public half of TSTTC_RECEIPT_KEY."
+        return [Error(message, id="leaderboard.E001")]
+    return []
+
+
+def check_public_key(app_configs: Sequence[Any] | None = None, **kwargs: Any) -> list[CheckMessage]:
+    """Say in production what backups lack. No fault: the site does without."""
+    if settings.PRODUCTION and settings.HAS_RECEIPT_KEY and not settings.RECEIPT_PUBLIC_KEY:
+        own = receipts.encode(receipts.public_key(private_key()))
+        return [Info(f"{PUBLIC_KEY} is not set; for backups, set it to {own}", id="leaderboard.I002")]
     return []

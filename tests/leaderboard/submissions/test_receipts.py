@@ -136,13 +136,45 @@ def test_receipt_is_a_file_on_the_submissions_page(
 
 def test_command_makes_a_key_that_signs(settings: Settings) -> None:
     call_command("make_receipt_key", stdout=(out := StringIO()), stderr=(err := StringIO()))
-    name, _, key = out.getvalue().strip().partition("=")
-    assert name == "TSTTC_RECEIPT_KEY"
-    settings.RECEIPT_KEY = key
+    lines = dict(line.split("=", 1) for line in out.getvalue().splitlines())
+    assert list(lines) == ["TSTTC_RECEIPT_KEY", "TSTTC_RECEIPT_PUBLIC_KEY"]
+    settings.RECEIPT_KEY = key = lines["TSTTC_RECEIPT_KEY"]
     published = receipts.public_keys()["keys"][0]
     assert published["kid"] in err.getvalue()
-    assert published["x"] in err.getvalue()
+    assert published["x"] == lines["TSTTC_RECEIPT_PUBLIC_KEY"]
     assert key not in json.dumps(published) + err.getvalue()
+
+
+def test_at_a_rotation_the_command_prints_the_former_keys_with_the_present_one(
+    scored: Submission, owner: User, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    oldest = form.encode(form.public_key(bytes(32)))
+    settings.RECEIPT_KEY = form.encode(bytes(range(32)))
+    before = client_of(owner).get(address(scored)).content
+    monkeypatch.setenv("TSTTC_RECEIPT_KEY", settings.RECEIPT_KEY)
+    monkeypatch.setenv("TSTTC_RECEIPT_OLD_KEYS", oldest)
+    call_command("make_receipt_key", stdout=(out := StringIO()), stderr=StringIO())
+    lines = dict(line.split("=", 1) for line in out.getvalue().splitlines())
+    former = lines["TSTTC_RECEIPT_OLD_KEYS"].split(",")
+    assert former == [form.encode(form.public_key(bytes(range(32)))), oldest]
+    settings.RECEIPT_KEY, settings.RECEIPT_OLD_KEYS = lines["TSTTC_RECEIPT_KEY"], former
+    assert verified(before).submission == str(scored.pk)
+    after = client_of(owner).get(address(scored)).content
+    assert verified(after).key_id != verified(before).key_id
+
+
+def test_a_process_without_the_key_knows_its_public_half_and_publishes_no_random_one(
+    settings: Settings,
+) -> None:
+    own = form.encode(form.public_key(receipts.private_key()))
+    settings.HAS_RECEIPT_KEY = False
+    assert receipts.known_public_keys() == {"keys": []}
+    settings.RECEIPT_PUBLIC_KEY = own
+    assert [key["x"] for key in receipts.known_public_keys()["keys"]] == [own]
+    settings.HAS_RECEIPT_KEY = True
+    settings.RECEIPT_PUBLIC_KEY = form.encode(form.public_key(bytes(32)))
+    [error] = receipts.check_keys()
+    assert f"expected '{own}', the public half" in error.msg
 
 
 @pytest.mark.parametrize("key", ["", "A" * 44, "Ä" * 43])
