@@ -1,99 +1,139 @@
-"""Make a backup: the tables of one moment, then every file that they name and that the folder lacks."""
+"""Make a backup: the tables of one moment, then every file that they name.
 
+One bad file stops nothing: the tables and the other files are saved, and the fault is in the list.
+"""
+
+import fcntl
+import os
+import re
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
-from typing import IO
+from typing import Final
 
+from django.db import Error as DatabaseProblem
 from django.db import connection
 
 from leaderboard import audit
-from leaderboard.backups import contents, database
+from leaderboard.backups import contents, copies, database
 from leaderboard.backups.contents import Contents, NoBackup
-from leaderboard.storage import files
+from leaderboard.db import clock
+from leaderboard.ops import backup_runs
 from leaderboard.submissions import receipts
+
+_ROWS: Final = re.compile(r"database-\d{8}T\d{12}")
 
 
 def make(*, into: str, now: datetime) -> Contents:
-    """Write a backup of the whole site into a folder that is empty or has an earlier one.
+    """Write a backup of the whole site into a folder, which may have an earlier one and files of others.
 
-    Lost files are in `missing`. Raises `NoBackup`, and `OSError`; an earlier backup then stays as it was.
+    The run is recorded in the database. Files that are lost, damaged or unreadable are in `faults`.
+    Raises `NoBackup`, `OSError` and the database's error; an earlier backup then stays as it was.
     """
-    contents.require_receipt_key()
-    folder = contents.folder_of(into)
-    former = _former(folder)
-    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    rows = folder / f"database-{now:%Y%m%dT%H%M%S%f}"
-    rows.mkdir(mode=0o700)
+    run = backup_runs.begin(now)
     try:
-        with database.one_moment():
-            saved = database.save(rows)
-            needed, remade = contents.named_files()
-            missing = contents.missing_values()
-            migrations, boards = contents.applied_migrations(), contents.board_digests()
-            tip = audit.verify().tip
-        kept = {name: keep(folder, name, former) for name in [*needed, *remade]}
-        private = {
-            path.name: _copy(folder / contents.GROUND_TRUTH / path.name, path.open)
-            for path in contents.private_files()
-        }
-        made = Contents(
-            format=contents.FORMAT,
-            made_at=now.isoformat(),
-            vendor=connection.vendor,
-            migrations=migrations,
-            database=f"{rows.name}/{saved.name}",
-            database_sha256=contents.digest_at(saved),
-            files={name: digest for name, digest in kept.items() if digest},
-            ground_truth=private,
-            missing=[*missing, *(name for name in needed if not kept[name])],
-            keys=receipts.public_keys(),
-            boards=boards,
-            audit=tip,
-        )
-        made.write(folder)
-    except BaseException:
-        shutil.rmtree(rows)
+        made = _make(into=into, now=now)
+    except BaseException as fault:
+        # What went wrong matters more than the record of it.
+        with suppress(DatabaseProblem):
+            reason = str(fault) or type(fault).__name__
+            backup_runs.finish(run, now=clock.database_now(), is_ok=False, fault=reason)
         raise
-    for old in folder.glob("database-*"):
-        if old != rows:
-            shutil.rmtree(old)
+    backup_runs.finish(
+        run,
+        now=clock.database_now(),
+        is_ok=not made.faults,
+        n_files=len(made.files) + len(made.ground_truth),
+        n_damaged=len(made.faults),
+        fault=contents.listed_faults(made.faults),
+    )
     return made
 
 
-def _former(folder: Path) -> Mapping[str, str]:
-    """Read the digests of an earlier backup. Raises `NoBackup` for another folder."""
-    if (folder / contents.LIST).exists():
-        return Contents.read(folder).files
-    ours = {contents.FILES, contents.GROUND_TRUTH}
+def _make(*, into: str, now: datetime) -> Contents:
+    folder = contents.folder_of(into)
+    former = _former(folder)
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    with _alone_in(folder):
+        rows = folder / f"database-{now:%Y%m%dT%H%M%S%f}"
+        rows.mkdir(mode=0o700)
+        try:
+            made = _saved(folder, rows, former, now=now)
+            made.write(folder)
+        except BaseException:
+            shutil.rmtree(rows)
+            raise
+        for old in folder.glob("database-*"):
+            if old != rows and _ROWS.fullmatch(old.name):
+                shutil.rmtree(old)
+    return made
+
+
+def _saved(folder: Path, rows: Path, former: Contents | None, *, now: datetime) -> Contents:
+    with database.one_moment():
+        saved = database.save(rows)
+        needed, remade = contents.named_files()
+        needed_private = contents.needed_private_files()
+        migrations, boards = contents.applied_migrations(), contents.board_digests()
+        tip = audit.verify().tip
+    faults: dict[str, str] = {}
     try:
-        names = sorted(path.name for path in folder.iterdir())
-    except FileNotFoundError:
-        return {}
-    except NotADirectoryError:
-        raise NoBackup(f"{folder} is a file; expected a folder.") from None
-    # What a backup that was interrupted left is gone on with.
-    others = [name for name in names if name not in ours and not name.startswith("database-")]
-    if others:
-        raise NoBackup(
-            f"{folder} holds {others[0]!r}; expected an empty folder, or one of an earlier backup."
-        )
-    return {}
+        private = sorted(needed_private.union(contents.private_files()))
+    except OSError as fault:
+        faults[contents.GROUND_TRUTH] = f"cannot be read: {fault.strerror}; expected to run where workers run"
+        private = sorted(needed_private)
+    kept_private, kept = {}, {}
+    listed = former.ground_truth if former else {}
+    for path in private:
+        copy = copies.keep_private(folder, path, former=listed.get(path.name, ""), now=now)
+        kept_private[path.name] = copy.digest
+        if copy.fault:
+            faults[f"{contents.GROUND_TRUTH}/{path.name}"] = copy.fault
+    listed = former.files if former else {}
+    reader = copies.StoreReader()
+    for name in [*needed, *remade]:
+        copy = copies.keep_stored(folder, name, former=listed.get(name, ""), reader=reader)
+        kept[name] = copy.digest
+        # What workers make again is no loss.
+        if copy.fault and name not in remade:
+            faults[name] = copy.fault
+    return Contents(
+        format=contents.FORMAT,
+        made_at=now.isoformat(),
+        vendor=connection.vendor,
+        migrations=migrations,
+        database=f"{rows.name}/{saved.name}",
+        database_sha256=contents.digest_at(saved),
+        files={name: digest for name, digest in kept.items() if digest},
+        ground_truth={name: digest for name, digest in kept_private.items() if digest},
+        faults=faults,
+        keys=receipts.known_public_keys(),
+        boards=boards,
+        audit=tip,
+    )
 
 
-def keep(folder: Path, name: str, former: Mapping[str, str]) -> str:
-    """Copy a file of the store unless it is there. Returns its SHA-256, or "" where it is gone."""
-    target = folder / contents.FILES / name
-    if name in former and contents.digest_at(target) == former[name]:
-        return former[name]
+def _former(folder: Path) -> Contents | None:
+    """Read the list of an earlier backup; None if there is none. Raises `NoBackup` for another thing."""
+    if folder.exists() and not folder.is_dir():
+        raise NoBackup(f"{folder} is a file; expected a folder.")
+    contents.require_no_other_kind(folder)
+    return Contents.read(folder) if (folder / contents.LIST).exists() else None
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Keep other backups out of the folder: one would remove the tables that the other has just saved."""
+    handle = os.open(folder, os.O_RDONLY)
     try:
-        return _copy(target, lambda mode: files.store().open(name, mode))
-    except FileNotFoundError:
-        return ""
-
-
-def _copy(target: Path, opened: Callable[[str], IO[bytes]]) -> str:
-    with opened("rb") as source, files.replacing(target) as unfinished, unfinished.open("wb") as out:
-        shutil.copyfileobj(source, out, files.CHUNK_BYTES)
-    return contents.digest_at(target)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise NoBackup(
+                f"Another backup is being written into {folder}; expected one at a time."
+            ) from None
+        yield
+    finally:
+        os.close(handle)

@@ -2,8 +2,7 @@
 
 import hashlib
 import json
-import os
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any, Final
@@ -13,22 +12,34 @@ from django.contrib.auth.models import AnonymousUser
 from django.db import connection
 from django.db.migrations.recorder import MigrationRecorder
 
+from evaluator import archives
 from evaluator.tables import formats
 from leaderboard.boards import listing
 from leaderboard.exports import tables
 from leaderboard.models import Edition, GroundTruth, Submission
-from leaderboard.ops import environment
-from leaderboard.storage import files, truth_values
+from leaderboard.storage import files, hidden_marks, seeds, truth_values
 from leaderboard.storage.files import CHUNK_BYTES
 
 LIST: Final = "backup.json"
 FILES: Final = "files"
 GROUND_TRUTH: Final = "ground-truth"
-FORMAT: Final = 3
+FORMAT: Final = 4
+# Its lost files are a list of names, and it knows no damaged ones.
+_FORMER_FORMAT: Final = 3
 # Sums and manifests that workers make again; files named tmp… are being written at this moment.
 _REMADE_FOLDER: Final = "bags"
 _SHOWN: Final = 10
-_KEY: Final = "TSTTC_RECEIPT_KEY"
+_STORE: Final = "the file store of a site"
+_OTHER_KINDS: Final = {
+    "predictions": _STORE,
+    "manifests": _STORE,
+    "aligned": _STORE,
+    files.INCOMING: _STORE,
+    "seed.key": "the ground truth of a site",
+    "leaderboard.sqlite3": "the data directory of a site",
+    "manage.py": "a copy of the project",
+    archives.LIST: "an archive",
+}
 
 
 class NoBackup(Exception):
@@ -47,7 +58,7 @@ class Contents:
     database_sha256: str
     files: dict[str, str]
     ground_truth: dict[str, str]
-    missing: list[str]
+    faults: dict[str, str]  # what is wrong with files of the site, by path
     keys: dict[str, Any]
     boards: dict[str, str]
     audit: str
@@ -62,6 +73,9 @@ class Contents:
         path = folder / LIST
         try:
             document = json.loads(path.read_text(encoding="utf-8"))
+            if document["format"] == _FORMER_FORMAT:
+                document["format"] = FORMAT
+                document["faults"] = dict.fromkeys(document.pop("missing"), "is missing on the site")
             if document["format"] != FORMAT:
                 raise NoBackup(f"{path} has the format {document['format']!r}; expected {FORMAT}.")
             contents = cls(**document)
@@ -86,17 +100,23 @@ class Contents:
 def folder_of(text: str) -> Path:
     """The folder that a command names. Raises `NoBackup` for one of the site's own."""
     folder = Path(text).resolve()
-    for name, own in (("file store", settings.FILES_DIR), ("ground truth", settings.GROUND_TRUTH_DIR)):
+    bags = [("sums per recording", settings.BAGS_DIR)] if settings.BAGS_DIR else []
+    own_folders = [("file store", settings.FILES_DIR), ("ground truth", settings.GROUND_TRUTH_DIR), *bags]
+    # A link below the folder would lead there as well.
+    parts = {folder, *((folder / part).resolve() for part in (FILES, GROUND_TRUTH))}
+    for name, own in own_folders:
         kept = Path(own).resolve()
-        if folder.is_relative_to(kept) or kept.is_relative_to(folder):
-            raise NoBackup(f"{folder} and the {name}, {kept}, lie in each other; expected a folder apart.")
+        for part in sorted(parts):
+            if part.is_relative_to(kept) or kept.is_relative_to(part):
+                raise NoBackup(f"{part} and the {name}, {kept}, lie in each other; expected a folder apart.")
     return folder
 
 
-def require_receipt_key() -> None:
-    """Refuse a process of the site without the key of receipts. Raises `NoBackup`."""
-    if environment.PRODUCTION and not os.environ.get(_KEY):
-        raise NoBackup(f"{_KEY} is not set; expected it here too, since its public half is written.")
+def require_no_other_kind(folder: Path) -> None:
+    """Refuse a folder that is plainly something else. Other files next to a backup are no fault."""
+    for name, kind in _OTHER_KINDS.items():
+        if (folder / name).exists():
+            raise NoBackup(f"{folder} holds {name!r}: it is {kind}; expected a folder of backups.")
 
 
 def digest_of(file: IO[bytes]) -> str:
@@ -127,27 +147,27 @@ def named_files() -> tuple[list[str], list[str]]:
     return sorted(needed), sorted(aligned)
 
 
-def private_files() -> Iterator[Path]:
-    """What the ground-truth directory holds: values, manifests, marks and the secret of hidden splits."""
+def private_files() -> list[Path]:
+    """What the ground-truth directory holds: values, manifests, marks and the secret of hidden splits.
+
+    Raises `OSError` if it cannot be read.
+    """
     try:
         paths = sorted(Path(settings.GROUND_TRUTH_DIR).iterdir())
     except FileNotFoundError:
-        return
-    except OSError as fault:
-        raise NoBackup(
-            f"The ground truth at {settings.GROUND_TRUTH_DIR} cannot be read ({fault.strerror}); "
-            "expected to run where workers run."
-        ) from fault
-    for path in paths:
-        if path.name != _REMADE_FOLDER and path.is_file() and not path.name.startswith("tmp"):
-            yield path
+        return []
+    kept = (path for path in paths if path.name != _REMADE_FOLDER and not path.name.startswith("tmp"))
+    return [path for path in kept if path.is_file()]
 
 
-def missing_values() -> list[str]:
-    """Ground truths of the database whose values are not in the directory, by file name."""
-    digests = GroundTruth.objects.order_by("pk").values_list("pk", flat=True)
-    paths = (truth_values.values_path(digest) for digest in digests)
-    return [f"{GROUND_TRUTH}/{path.name}" for path in paths if not path.exists()]
+def needed_private_files() -> set[Path]:
+    """What the database needs of the ground-truth directory, whether or not it is there."""
+    needed: set[Path] = set()
+    for digest, is_hidden in GroundTruth.objects.order_by().values_list("pk", "split__is_hidden"):
+        needed |= {truth_values.values_path(digest), truth_values.manifest_path(digest)}
+        if is_hidden:
+            needed |= {hidden_marks.path(digest), seeds.path()}
+    return needed
 
 
 def board_digests() -> dict[str, str]:
@@ -165,6 +185,10 @@ def applied_migrations() -> list[list[str]]:
     return sorted([app, name] for app, name in MigrationRecorder(connection).applied_migrations())
 
 
-def listed(names: list[str]) -> str:
-    rest = [f"… and {len(names) - _SHOWN:,} more"] if len(names) > _SHOWN else []
-    return "\n".join(f"  {line}" for line in [*names[:_SHOWN], *rest])
+def listed(lines: list[str]) -> str:
+    rest = [f"… and {len(lines) - _SHOWN:,} more"] if len(lines) > _SHOWN else []
+    return "\n".join(f"  {line}" for line in [*lines[:_SHOWN], *rest])
+
+
+def listed_faults(faults: Mapping[str, str]) -> str:
+    return listed([f"{name} {fault}" for name, fault in sorted(faults.items())])

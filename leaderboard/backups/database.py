@@ -38,14 +38,9 @@ def save(folder: Path) -> Path:
     """Write every row into a file of the folder; to be called within `one_moment`. Raises `NoBackup`."""
     path = folder / ROWS[connection.vendor]
     if connection.vendor == "sqlite":
-        # Nobody writes while our transaction lasts, so another connection reads what it reads.
-        uri = f"file:{connection.settings_dict['NAME']}?mode=ro"
-        with (
-            replacing(path) as unfinished,
-            closing(sqlite3.connect(uri, uri=True)) as source,
-            closing(sqlite3.connect(unfinished)) as target,
-        ):
-            source.backup(target)
+        # Nobody writes while our transaction lasts.
+        with replacing(path) as unfinished:
+            unfinished.write_bytes(connection.connection.serialize())
     else:
         with connection.cursor() as cursor:
             cursor.execute("SELECT pg_export_snapshot()")

@@ -1,18 +1,18 @@
 """Restore a backup into an empty site, and compare its digests with those of the backup."""
 
-import os
 import shutil
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 from django.conf import settings
+from django.contrib.sessions.models import Session
 from django.core.files.base import File
 
 from leaderboard import audit
 from leaderboard.backups import contents, database
 from leaderboard.backups.contents import Contents, NoBackup
-from leaderboard.ops import environment
-from leaderboard.storage import files
+from leaderboard.storage import files, ownership
 from leaderboard.submissions import receipts
 
 
@@ -21,14 +21,17 @@ class Restored:
     """What was restored."""
 
     contents: Contents
+    store_is_of: str  # whose the file store is, if not this site's; it is not cleaned then
+    kept_until: datetime  # until then no file is removed, since a newer database may name it
     n_boards: int  # boards that were compared: none where this version is later than the backup's
     keys_away: list[dict[str, str]]  # keys of the backup with which this installation cannot check receipts
 
 
-def restore(*, source: str) -> Restored:
+def restore(*, source: str, now: datetime) -> Restored:
     """Put a backup into a fresh database, file store and ground-truth directory, and verify each of them.
 
-    The database comes last, so an interrupted restoration can be repeated. Raises `NoBackup`.
+    The database comes last, so an interrupted restoration can be repeated. It becomes another site than
+    the one that was backed up (`storage.ownership`), and its sessions end. Raises `NoBackup`.
     """
     folder = contents.folder_of(source)
     kept = Contents.read(folder)
@@ -37,6 +40,7 @@ def restore(*, source: str) -> Restored:
     database.require_fresh(kept)
     private = Path(settings.GROUND_TRUTH_DIR)
     _require_no_others(private, kept)
+    is_new_store = _is_new_store(kept)
     private.mkdir(parents=True, exist_ok=True, mode=0o700)
     for name in kept.ground_truth:
         with files.replacing(private / name) as path:
@@ -45,7 +49,17 @@ def restore(*, source: str) -> Restored:
         with (folder / contents.FILES / name).open("rb") as file:
             files.store().save(name, File(file))
     database.load(folder / kept.database)
-    return Restored(kept, _verified_boards(kept), _keys_away(kept))
+    # Before anything is compared: whatever differs, no file may be removed soon.
+    site = ownership.note_restore(now=now)
+    # Who has signed out since, or has another password now, is not let in by what the browser kept.
+    Session.objects.all().delete()
+    store_is_of = ownership.take_if_new(site, is_new=is_new_store)
+    return Restored(kept, store_is_of, ownership.kept_until(now), _verified_boards(kept), _keys_away(kept))
+
+
+def _is_new_store(kept: Contents) -> bool:
+    """Tell whether the store has no prediction file but those of the backup."""
+    return all(name in kept.files for name in files.stored_predictions())
 
 
 def _require_whole(folder: Path, kept: Contents) -> None:
@@ -64,7 +78,11 @@ def _require_whole(folder: Path, kept: Contents) -> None:
 
 def _require_no_others(private: Path, kept: Contents) -> None:
     # A secret of another site would be replaced.
-    for path in contents.private_files():
+    try:
+        paths = contents.private_files()
+    except OSError as fault:
+        raise NoBackup(f"{private} cannot be read ({fault.strerror}). Nothing was changed.") from fault
+    for path in paths:
         if contents.digest_at(path) != kept.ground_truth.get(path.name):
             raise NoBackup(
                 f"{private} holds {path.name}, which the backup does not have like that; expected an empty "
@@ -92,7 +110,5 @@ def _verified_boards(kept: Contents) -> int:
 
 
 def _keys_away(kept: Contents) -> list[dict[str, str]]:
-    # A process without the key has one of its own, which signs nothing.
-    has_key = not environment.PRODUCTION or bool(os.environ.get("TSTTC_RECEIPT_KEY"))
-    here = {key["kid"] for key in receipts.public_keys()["keys"]} if has_key else set()
+    here = {key["kid"] for key in receipts.known_public_keys()["keys"]}
     return [key for key in kept.keys["keys"] if key["kid"] not in here]

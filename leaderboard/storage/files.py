@@ -103,7 +103,7 @@ class DurableFileSystemStorage(FileSystemStorage):
 
     @answering()
     def _open(self, name: str, mode: str = "rb") -> "File[bytes]":
-        opened = super()._open(name, mode)  # type: ignore[misc]  # the stubs lack it
+        opened = super()._open(name, mode)  # type: ignore[misc]  # Django documents it; its stubs lack it
         try:
             # A broken disk says so at the first read, when an answer may have begun already.
             os.pread(opened.fileno(), 1, 0)
@@ -206,6 +206,21 @@ def open_named(name: str) -> "File[bytes]":
 def predictions_name(digest: str) -> str:
     hexadecimal = digest.removeprefix("sha256:")
     return f"predictions/{hexadecimal[:2]}/{hexadecimal}.json"
+
+
+def stored_predictions() -> Iterator[str]:
+    """Yield the names of all prediction files in the store. Raises `OSError`."""
+    for folder in folders_below("predictions"):
+        yield from (f"{folder}/{name}" for name in store().listdir(folder)[1])
+
+
+def folders_below(folder: str) -> list[str]:
+    """Return the folders in a folder of the store, sorted; none where it is missing. Raises `OSError`."""
+    try:
+        return [f"{folder}/{part}" for part in sorted(store().listdir(folder)[0])]
+    except FileNotFoundError:
+        # Nothing of the kind was ever kept.
+        return []
 
 
 def manifest_name(digest: str) -> str:

@@ -7,13 +7,14 @@ from django.conf import settings
 
 def put(digest: str) -> None:
     """Mark the values of this digest as hidden, for good."""
-    _path(digest).touch(mode=0o600)
+    path(digest).touch(mode=0o600)
 
 
 def is_marked(digest: str) -> bool:
     """Tell whether the values of this digest were imported as hidden."""
-    return _path(digest).exists()
+    return path(digest).exists()
 
 
-def _path(digest: str) -> Path:
+def path(digest: str) -> Path:
+    """Return the path of the mark, next to the values."""
     return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.hidden"

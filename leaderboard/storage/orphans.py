@@ -1,8 +1,8 @@
 """Files that no submission names: of refused uploads, or of processes that died before they wrote the rows.
 
 A submission's bytes are stored before its rows, so that nothing acknowledged is lost. Orphans are removed
-after a day. Equal bytes are one file, so a writer of a row locks the file and checks it, and a remover locks
-it alone and checks the rows.
+after a day, if the store is this site's and no restore was recent (`storage.ownership`). Equal bytes are one
+file, so a writer of a row locks the file and checks it, and a remover locks it alone and checks the rows.
 """
 
 import hashlib
@@ -18,8 +18,9 @@ import structlog
 from django.db import connection, transaction
 
 from leaderboard import audit
+from leaderboard.db import clock
 from leaderboard.models import Submission
-from leaderboard.storage import files
+from leaderboard.storage import files, ownership
 
 log = structlog.get_logger(__name__)
 
@@ -40,7 +41,12 @@ class Orphan:
 
 
 def orphans(*, now: datetime) -> Iterator[Orphan]:
-    """Yield predictions and values that no submission has named for a day. Raises `OSError`."""
+    """Yield predictions and values that no submission has named for a day, and that this site may remove.
+
+    Raises `OSError`.
+    """
+    if not ownership.may_remove_files(now=now):
+        return
     for folder in FOLDERS:
         for name, digest in _without_rows(folder):
             try:
@@ -82,7 +88,7 @@ def unless_refused(*refusals: type[Exception], digest: str) -> Iterator[None]:
         yield
     except refusals:
         try:
-            is_removed = _remove_unnamed(digest)
+            is_removed = ownership.may_remove_files(now=clock.database_now()) and _remove_unnamed(digest)
             log.info("refused_file", digest=digest, is_removed=is_removed)
         except OSError as fault:
             # The answer is the refusal all the same; the file is removed in a day.
@@ -128,18 +134,10 @@ def leftovers() -> list[Path]:
 def _without_rows(folder: str) -> Iterator[tuple[str, str]]:
     """Yield name and digest of files that no submission names, withdrawn ones included."""
     known = set(Submission.objects.values_list("digest", flat=True))
-    for part in _folders(folder):
+    for part in files.folders_below(folder):
         named = {
             f"{part}/{name}": f"sha256:{match[1]}"
             for name in sorted(files.store().listdir(part)[1])
             if (match := _NAMED.fullmatch(name))
         }
         yield from ((name, digest) for name, digest in named.items() if digest not in known)
-
-
-def _folders(folder: str) -> list[str]:
-    try:
-        return [f"{folder}/{part}" for part in sorted(files.store().listdir(folder)[0])]
-    except FileNotFoundError:
-        # Nothing of the kind was ever kept.
-        return []

@@ -63,7 +63,14 @@ def test_units_start_programs_that_there_are_without_privileges(path: Path) -> N
     assert (service["ProtectSystem"], service["ProtectProc"]) == ("strict", "invisible")
     assert (service["NoNewPrivileges"], service["CapabilityBoundingSet"]) == ("yes", "")
     assert service["SupplementaryGroups"] == "tsttc-files"
+    assert ("EnvironmentFile=/etc/tsttc-web.env" in path.read_text()) == (path.stem == "tsttc-web")
     assert (service["User"] == service["Group"] == "tsttc-web") == (path.stem == "tsttc-web")
+
+
+def test_a_backup_that_fails_sends_a_mail() -> None:
+    unit = (DEPLOY / "systemd/tsttc-backup.service").read_text()
+    assert "\nOnFailure=tsttc-failure@%n.service\n" in unit
+    assert "report_failure %i" in (DEPLOY / "systemd/tsttc-failure@.service").read_text()
 
 
 def test_only_the_worker_can_read_the_ground_truth() -> None:

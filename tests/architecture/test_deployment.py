@@ -46,14 +46,15 @@ READ = names_in(
 )
 
 
-def test_only_the_worker_and_the_maintainer_see_the_ground_truth() -> None:
+def test_only_the_worker_and_the_maintainers_commands_see_the_ground_truth() -> None:
     seeing = {
         name
         for name, service in SERVICES.items()
         if any(target == GROUND_TRUTH or GROUND_TRUTH.startswith(f"{target}/") for target in mounts(service))
     }
-    assert seeing == {"worker", "maintainer", "restore"}
-    assert mounts(SERVICES["worker"])[GROUND_TRUTH].endswith(":ro")
+    assert seeing == {"worker", "maintainer", "backup", "restore"}
+    for name in ("worker", "backup"):
+        assert mounts(SERVICES[name])[GROUND_TRUTH].endswith(":ro")
     assert SERVICES["maintainer"]["profiles"] == SERVICES["restore"]["profiles"] == ["maintenance"]
 
 
@@ -78,6 +79,7 @@ def test_networks_are_for_one_purpose_each_and_workers_have_no_way_out() -> None
         "mailer": {"pages", "database"},
         "migrate": {"database"},
         "maintainer": {"database", "broker"},
+        "backup": {"database"},
         "restore": {"database"},
         "db": {"database"},
         "redis": {"broker"},
@@ -99,13 +101,14 @@ KEYS = {
     "TSTTC_ORCID_CLIENT_SECRET",
     "TSTTC_GITHUB_CLIENT_SECRET",
 }
-RECEIPT_KEYS = {"TSTTC_RECEIPT_KEY", "TSTTC_RECEIPT_OLD_KEYS"}
+PUBLIC_KEYS = {"TSTTC_RECEIPT_OLD_KEYS"}
 S3_KEYS = {"AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"}
 HAVE: dict[str, set[str]] = {
     "web": KEYS | S3_KEYS | {"TSTTC_DATABASE_URL", "TSTTC_BROKER_URL"},
     "worker": S3_KEYS | {"TSTTC_DATABASE_URL", "TSTTC_BROKER_URL"},
-    "maintainer": RECEIPT_KEYS | S3_KEYS | {"TSTTC_DATABASE_URL", "TSTTC_BROKER_URL"},
-    "restore": RECEIPT_KEYS | S3_KEYS | {"TSTTC_DATABASE_URL"},
+    "maintainer": S3_KEYS | {"TSTTC_DATABASE_URL", "TSTTC_BROKER_URL"},
+    "backup": PUBLIC_KEYS | S3_KEYS | {"TSTTC_DATABASE_URL"},
+    "restore": PUBLIC_KEYS | S3_KEYS | {"TSTTC_DATABASE_URL"},
     "mailer": {"TSTTC_EMAIL_URL", "TSTTC_DATABASE_URL"},
     "migrate": {"TSTTC_DATABASE_URL", "TSTTC_APPLICATION_PASSWORD"},
 }

@@ -264,7 +264,7 @@ def test_a_backup_of_the_running_site_comes_back_byte_for_byte_on_a_fresh_site(
     sent = {path.relative_to(files).as_posix() for path in files.glob("predictions/**/*.json")}
     assert sent
     assert {name for name in kept["files"] if name.startswith("predictions/")} == sent
-    assert kept["missing"] == []
+    assert kept["faults"] == {}
     with migrated_database() as url:
         target = {"TSTTC_DATABASE_URL": url, "TSTTC_DATA_DIR": str(tmp_path / "new")}
         output = replace(site, environment=site.environment | target).manage("restore", str(folder))

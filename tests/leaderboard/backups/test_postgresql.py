@@ -48,9 +48,20 @@ PASSWORD = "correct-horse-battery"
 CASTS = re.compile(r"::(character varying|text)(\[\])?|[()]")
 
 
+REVOKE = """
+import django; django.setup()
+from leaderboard import audit
+from leaderboard.models import User
+for name in ("ada", "bob"):
+    user = User.objects.get(email=f"{name}@example.org")
+    audit.record_of(user, "closed", details={"reason": "It was hijacked."})
+User.objects.filter(email="bob@example.org").update(password="another one")
+"""
+
+
 @contextmanager
-def empty_database() -> Iterator[str]:
-    name = f"tsttc_test_{os.urandom(6).hex()}"
+def empty_database(name: str = "") -> Iterator[str]:
+    name = name or f"tsttc_test_{os.urandom(6).hex()}"
     with psycopg.connect(POSTGRES_ADMIN_URL, autocommit=True) as admin:
         admin.execute(sql.SQL("CREATE DATABASE {} TEMPLATE template0").format(sql.Identifier(name)))
         try:
@@ -75,8 +86,9 @@ def run(*command: str, url: str, data: Path, **variables: str) -> subprocess.Com
 
 def content(url: str) -> list[str]:
     """Tables, rows, triggers, constraints and sequences, in words."""
-    # Counters of wrong passwords, and when the tables were made.
-    without = [f"--exclude-table-data={name}" for name in ("leaderboard_cache", "django_migrations")]
+    # Counters of wrong passwords, when the tables were made, how the backup ended, and which site this is.
+    others = ("leaderboard_cache", "django_migrations", "leaderboard_backuprun", "leaderboard_installation")
+    without = [f"--exclude-table-data={name}" for name in others]
     command = ["pg_dump", "--no-owner", "--no-privileges", *without, url]
     text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     # The key of \restrict is another one each time.
@@ -142,6 +154,42 @@ def test_what_was_restored_into_a_fresh_database_is_what_was_saved_and_goes_on(
         went_on = run("-c", GO_ON, url=new, data=tmp_path)
         assert went_on.returncode == 0, went_on.stderr
         assert "append-only" in went_on.stdout
+
+
+def test_a_restore_lists_what_the_newer_database_beside_it_has_done(source: Source, tmp_path: Path) -> None:
+    with empty_database() as new, empty_database(f"{urlsplit(new).path[1:]}_newer") as newer:
+        done = run("manage.py", "restore", str(source.backup), url=newer, data=tmp_path / "newer")
+        assert "manage.py list_actions --database URL" in done.stdout, done.stderr
+        assert run("-c", REVOKE, url=newer, data=tmp_path).returncode == 0
+        done = run("manage.py", "restore", str(source.backup), url=new, data=tmp_path / "new")
+        for name in ("ada", "bob"):
+            assert f"User {name}@example.org: closed (reason: It was hijacked.)" in done.stdout, done.stderr
+        assert "  bob@example.org: password\n" in done.stdout
+        assert "ada@example.org: password" not in done.stdout
+        assert "Unused files are kept until 20" in done.stdout
+        listed = run("manage.py", "list_actions", "--database", newer, url=new, data=tmp_path / "new")
+        assert "To be done again first" in listed.stdout, listed.stderr
+
+
+def test_a_second_site_that_is_restored_into_the_store_of_the_first_does_not_clean_it(
+    source: Source, tmp_path: Path
+) -> None:
+    data = source.backup.parent / "data"
+    store = tmp_path / "files"
+    shutil.copytree(data / "files", store)
+    code = "import django; django.setup(); from django.utils import timezone; " + (
+        "from leaderboard.storage import ownership; print(ownership.may_remove_files(now=timezone.now()))"
+    )
+    first = run("-c", code, url=source.url, data=data, TSTTC_FILES_DIR=str(store))
+    assert first.stdout == "True\n", first.stderr
+    mark = (store / "site.json").read_bytes()
+    with empty_database() as new:
+        options = {"url": new, "data": tmp_path / "second", "TSTTC_FILES_DIR": str(store)}
+        done = run("manage.py", "restore", str(source.backup), **options)  # type: ignore[arg-type]  # of two kinds
+        assert "The file store belongs to another site" in done.stdout, done.stderr
+        again = run("-c", code, **options)  # type: ignore[arg-type]  # of two kinds
+        assert again.stdout.endswith("False\n")
+    assert (store / "site.json").read_bytes() == mark
 
 
 def test_the_command_line_of_the_program_has_no_password(source: Source) -> None:

@@ -48,7 +48,8 @@ def test_every_command_has_one_row_in_the_maintainers_guide_and_one_in_the_list(
 def test_maintainers_command_runs_as_the_account_with_the_settings_of_the_site(tmp_path: Path) -> None:
     script = (REPOSITORY / "deploy/tsttc-maintain").read_text("utf-8")
     (tmp_path / "tsttc.env").write_text("TSTTC_SITE_URL=https://board.example.org\n")
-    (tmp_path / "tsttc-web.env").write_text("TSTTC_FROM_EMAIL='Board <b@example.org>'\n")
+    (tmp_path / "tsttc-worker.env").write_text("TSTTC_FROM_EMAIL='Board <b@example.org>'\n")
+    (tmp_path / "tsttc-web.env").write_text("TSTTC_SECRET_KEY=s\nTSTTC_RECEIPT_KEY=r\n")
     program = (
         "import os; print(os.getuid(), os.umask(0), *map(os.getenv, __import__('sys').argv[1:]), sep='|')"
     )
@@ -57,14 +58,28 @@ def test_maintainers_command_runs_as_the_account_with_the_settings_of_the_site(t
         "/etc/": f"{tmp_path}/",
         "/srv/tsttc/": f"{tmp_path}/",
         "/opt/tsttc/bin/python": sys.executable,
-        "--reuid tsttc --regid tsttc": "--reuid root --regid root",
+        '--reuid "$account" --regid "$account"': "--reuid root --regid root",
     }
     for original, test_value in replaced.items():
         assert original in script
         script = script.replace(original, test_value)
     names = ["TSTTC_PROCESS", "TSTTC_SITE_URL", "TSTTC_FROM_EMAIL"]
-    done = subprocess.run(["/bin/sh", "-c", script, "sh", *names], capture_output=True, text=True, check=True)
-    assert done.stdout == f"0|{0o007}|maintainer|https://board.example.org|Board <b@example.org>\n"
+    assert run_script(script, *names) == (
+        f"0|{0o007}|maintainer|https://board.example.org|Board <b@example.org>\n"
+    )
+    # Keys of the web process stay there, but for the command that signs, which runs as its account.
+    keys = ["TSTTC_PROCESS", "TSTTC_SECRET_KEY", "TSTTC_RECEIPT_KEY"]
+    assert run_script(script, *keys).endswith("|maintainer|None|None\n")
+    assert run_script(script, "backup", *keys).endswith("|None|backup|None|None\n")
+    assert run_script(script, "archive", *keys).endswith("|None|maintainer|None|r\n")
+    accounts = (REPOSITORY / "deploy/tsttc-maintain").read_text("utf-8").partition("archive)")[2]
+    assert "account=tsttc-web\n" in accounts.partition(";;")[0]
+
+
+def run_script(script: str, *arguments: str) -> str:
+    """What the program prints that the script runs: first, as here, its account, and its umask."""
+    command = ["/bin/sh", "-c", script, "sh", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
 def test_every_command_that_a_document_or_a_page_names_is_there() -> None:

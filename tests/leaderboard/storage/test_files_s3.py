@@ -20,7 +20,7 @@ from pytest_django import Settings
 
 from leaderboard.backups import contents
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
-from leaderboard.storage import files, orphans, s3
+from leaderboard.storage import files, orphans, ownership, s3
 from tests import builders
 from tests.prepared import REPOSITORY, put_sqlite
 from tests.services import environment_of_its_own
@@ -169,7 +169,7 @@ def test_orphan_in_the_bucket_is_listed_and_removed(stored: s3.S3FileStore, buck
     assert (orphan.digest, orphan.size_bytes) == (kept.digest, 10)
     assert not orphans.remove(orphan, now=timezone.now()), "written within the day"
     assert orphans.remove(orphan, now=in_two_days)
-    assert _names(bucket) == []
+    assert _names(bucket) == [f"files/{ownership.NAME}"]
 
 
 # --- backups --------------------------------------------------------------------------------------------
@@ -217,9 +217,10 @@ def test_an_sqlite_database_and_the_files_of_a_bucket_come_back_once(
     assert "ada@example.org" in done.stdout, done.stderr
     assert "The database has users already" in done.stderr
     listed = json.loads((folder / contents.LIST).read_text())
-    assert (listed["vendor"], listed["missing"]) == ("sqlite", [])
+    assert (listed["vendor"], listed["faults"]) == ("sqlite", {})
     assert folder.stat().st_mode & 0o077 == 0
-    [manifest] = bucket.objects.all()
+    manifest, site = bucket.objects.all()
+    assert site.key == f"files/{ownership.NAME}"
     assert manifest.key.startswith("files/manifests/")
     copy = folder / contents.FILES / manifest.key.removeprefix("files/")
     assert manifest.get()["Body"].read() == copy.read_bytes()
