@@ -12,6 +12,11 @@ def main() -> None:
     if sys.argv[1:2] == ["make_receipt_key"]:
         make_receipt_key()
         return
+    if os.environ.get("TSTTC_PROFILE") == "production":
+        # Commands read hidden values, keys and addresses: other processes of their account do not.
+        from evaluator.limits import keep_memory_private  # noqa: PLC0415 - nothing of it is on Windows
+
+        keep_memory_private()
     from django.core.exceptions import ImproperlyConfigured  # noqa: PLC0415 - settings come first
     from django.core.management import execute_from_command_line  # noqa: PLC0415 - settings come first
 
