@@ -54,7 +54,7 @@ def no_connection(fault: Exception) -> Delivery:
 
 def _tried(message: EmailMessage) -> Delivery:
     try:
-        message.send()
+        n_sent = message.send()
     except smtplib.SMTPRecipientsRefused as fault:
         [(code, answer)] = list(fault.recipients.values())[:1]
         return _answered(code, answer)
@@ -70,7 +70,7 @@ def _tried(message: EmailMessage) -> Delivery:
     except ValueError as fault:
         # An address or a subject that no mail can have.
         return Delivery(Outcome.REFUSED, _one_line(f"The address cannot be written in a mail: {fault}"))
-    return Delivery(Outcome.SENT)
+    return Delivery(Outcome.SENT) if n_sent else Delivery(Outcome.REFUSED, "The mail has no recipient.")
 
 
 def _answered(code: int, answer: bytes | str) -> Delivery:

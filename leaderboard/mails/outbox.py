@@ -5,7 +5,7 @@ sent at least once: a crash between sending and saving sends it again. A mail th
 good ends, one that it puts off waits alone, and only a fault of the connection stops a run.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime, timedelta
 from typing import Any, Final
 
@@ -32,9 +32,19 @@ KEPT: Final = timedelta(days=30)
 
 def send_or_keep(*, message: EmailMessage, now: datetime) -> None:
     """Send a mail to one person now, or keep it; never fails. What is refused for good is listed."""
-    delivery = deliver(message)
-    if delivery.outcome is Outcome.SENT:
-        return
+    send_or_keep_all(messages=[message], now=now)
+
+
+def send_or_keep_all(*, messages: Sequence[EmailMessage], now: datetime) -> None:
+    """Send mails to one person each, as `send_or_keep`, and wait for an absent server once only."""
+    delivery = Delivery(Outcome.SENT)
+    for message in messages:
+        delivery = delivery if delivery.outcome is Outcome.NO_CONNECTION else deliver(message)
+        if delivery.outcome is not Outcome.SENT:
+            _keep(message, delivery=delivery, now=now)
+
+
+def _keep(message: EmailMessage, *, delivery: Delivery, now: datetime) -> None:
     [recipient] = message.to
     mail = Mail.objects.create(
         kind=MailKind.ACCOUNT,

@@ -23,6 +23,7 @@ from django.contrib.auth.hashers import make_password
 from django.contrib.auth.models import AnonymousUser
 from django.contrib.sites.requests import RequestSite
 from django.core.cache import cache
+from django.core.mail import EmailMessage
 from django.db import transaction
 from django.http import HttpRequest
 from django.urls import reverse
@@ -62,12 +63,15 @@ class AccountAdapter(DefaultAccountAdapter):
 
     def send_mail(self, template_prefix: str, email: str, context: dict[str, Any]) -> None:
         """Send a mail with links to the configured site, now or later."""
+        outbox.send_or_keep(message=self._mail(template_prefix, email, context), now=timezone.now())
+
+    def _mail(self, template_prefix: str, email: str, context: dict[str, Any]) -> EmailMessage:
         links = {name: _on_our_site(value) for name, value in context.items() if _is_address(value)}
         given = {"request": allauth_context.request, "email": email, **context}
-        message = self.render_mail(
+        rendered: EmailMessage = self.render_mail(
             template_prefix, email, {**given, "current_site": ConfiguredSite(), **links}
         )
-        outbox.send_or_keep(message=message, now=timezone.now())
+        return rendered
 
     def get_login_redirect_url(self, request: HttpRequest) -> str:
         user = request.user
@@ -145,8 +149,12 @@ class AccountAdapter(DefaultAccountAdapter):
     def _tell(self, template_prefix: str, user: User, before: list[str], context: dict[str, Any]) -> None:
         now = timezone.now()
         what = template_prefix.rpartition("/")[2]
-        for address, link in takeovers.note(user=user, what=what, before=before, now=now).items():
-            self.send_mail(template_prefix, address, {"timestamp": now, **context, "undo_url": link})
+        links = takeovers.note(user=user, what=what, before=before, now=now)
+        messages = [
+            self._mail(template_prefix, address, {"timestamp": now, **context, "undo_url": link})
+            for address, link in links.items()
+        ]
+        outbox.send_or_keep_all(messages=messages, now=now)
 
     def get_reauthentication_methods(self, user: User | AnonymousUser) -> list[dict[str, Any]]:
         # By code alone where there is one: a known password shows no recovery codes.

@@ -54,7 +54,7 @@ def state_of(recipient: str) -> tuple[bool, str, str]:
 
 
 @pytest.mark.parametrize(
-    "dead", ["gone@example.org", "spam@example.org", "a b\n@example.org", "ä" * 70 + "@exa..mple"]
+    "dead", ["gone@example.org", "spam@example.org", "a b\n@example.org", "ä" * 70 + "@exa..mple", ""]
 )
 def test_refused_recipients_end_their_mails_and_delay_no_other(server: smtp_server.Server, dead: str) -> None:
     queue(*[dead] * 60, "first@example.org", "second@example.org")
@@ -135,6 +135,17 @@ def test_a_mail_that_is_refused_during_a_request_is_listed_at_once(server: smtp_
     assert state_of("gone@example.org") == (True, "", "550 5.1.1 No such user")
     assert state_of("full@example.org") == (False, "secret link", "452 4.2.2 Mailbox full")
     assert server.taken == ["first@example.org"]
+
+
+def test_a_server_that_breaks_off_is_waited_for_once_and_each_mail_is_kept(
+    server: smtp_server.Server,
+) -> None:
+    recipients = ["gone@example.org", "crash@example.org", "first@example.org", "second@example.org"]
+    messages = [EmailMessage("S", "T", to=[recipient]) for recipient in recipients]
+    outbox.send_or_keep_all(messages=messages, now=NOW)
+    assert server.asked == recipients[:2]
+    assert outbox.waiting() == 3
+    assert outbox.work_off(now=NOW + MINUTE) == 2
 
 
 def test_maintainers_see_which_mails_were_not_sent_and_why(
