@@ -110,7 +110,7 @@ def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
     row = _edition(split, number)
     past = history.record_of(row)
     context = {
-        **_comparison(row),
+        **_comparison(row, rows=request.GET.get("rows"), number=request.GET.get("page")),
         "predecessor": corrections.predecessor(row.split),
         "past": past,
         "change": edition_tables.past_change(past),
@@ -147,7 +147,7 @@ def preview_csv(request: HttpRequest, split: str, number: int) -> HttpResponse:
 @maintainers_form
 def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
     row = _edition(split, number)
-    context = _comparison(row)
+    context = _effects(row)
     form = PublishForm.asked(request, initial={"replaces": context["preview"].replaces})
     if form.is_valid():
         with form.refusals():
@@ -160,6 +160,7 @@ def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
     unfinished = [(each, states.get(each.pk, ABSENT)) for each in corrections.unfinished(row)]
     kinds = {state for _, state in unfinished}
     context |= {
+        "rejected": preview_tables.newly_rejected(context["preview"]),
         "unfinished": [(each, preview_tables.STATUS_LABELS[state]) for each, state in unfinished],
         "has_failed": Status.SYSTEM_ERROR in kinds,
         "can_reopen": row.published_at and not row.reopened_at and ABSENT in kinds,
@@ -182,7 +183,7 @@ def roll_back(request: HttpRequest, split: str, number: int) -> HttpResponse:
                 f"Edition {number} was rolled back: the {row.split.title} board is the one before it.",
             )
             return redirect("board", split)
-    context = {**_comparison(former), "undone": edition_tables.change_words(former, row)} if former else {}
+    context = {**_effects(former), "undone": edition_tables.change_words(former, row)} if former else {}
     return form_page(request, "maintain/roll_back.html", form, leaving=row, former=former, **context)
 
 
@@ -197,7 +198,8 @@ def discard(request: HttpRequest, split: str, number: int) -> HttpResponse:
             done = "closed again" if row.published_at else "discarded"
             messages.success(request, f"Edition {number} of {split} was {done}.")
             return redirect("maintain")
-    return form_page(request, "maintain/discard.html", form, **_comparison(row))
+    running = edition_tables.running(row, corrections.progress(row))
+    return form_page(request, "maintain/discard.html", form, edition=row, running=running)
 
 
 def maintainer_of(request: HttpRequest) -> User:
@@ -209,12 +211,18 @@ def _edition(split: str, number: int) -> Edition:
     return get_object_or_404(rows, split=split, number=number)
 
 
-def _comparison(row: Edition) -> dict[str, Any]:
+def _comparison(row: Edition, *, rows: str | None = None, number: str | None = None) -> dict[str, Any]:
+    context = _effects(row)
+    return context | {"table": preview_tables.change_table(context["preview"], rows=rows, number=number)}
+
+
+def _effects(row: Edition) -> dict[str, Any]:
+    """Return what publishing does in sentences, without the table of all submissions."""
     compared = preview.preview(row)
     return {
         "edition": row,
         "preview": compared,
-        "table": preview_tables.change_table(compared),
+        "effects": preview_tables.effects(compared),
         "running": edition_tables.running(row, compared.progress),
     }
 

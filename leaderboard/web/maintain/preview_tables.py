@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
+from django.core.paginator import Paginator
 from django.utils.text import get_text_list
 
 from evaluator import units
@@ -16,23 +17,39 @@ from leaderboard.models import Status
 from leaderboard.web.boards import edition_tables
 from leaderboard.web.boards.score_columns import column_css, score_heading
 
+PER_PAGE: Final = 50
+MOVED: Final = "moved"
 _ENDED_BADLY: Final = (Status.REJECTED, Status.SYSTEM_ERROR, Status.CANCELLED)
 STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}
 
 
-def change_table(preview: Preview) -> dict[str, Any]:
-    """Return the preview for the template."""
+def change_table(preview: Preview, *, rows: str | None = None, number: str | None = None) -> dict[str, Any]:
+    """Return a page of the preview for the template; with `rows` "moved", only entries with another rank."""
     primary, names = preview.edition.rules.primary.name, _shown_names(preview)
     ranks = [entry.new_rank for entry in preview.entries if entry.new_rank is not None]
+    moved = tuple(entry for entry in preview.entries if entry.rank_change > 0)
+    page = Paginator(moved if rows == MOVED else preview.entries, PER_PAGE).get_page(number)
     return {
+        "page": page,
+        "is_moved_only": rows == MOVED,
+        "n_entries": len(preview.entries),
+        "n_moved": len(moved),
         "headings": [score_heading(name, primary=primary) for name in names],
-        "rows": [_change_row(change, names, preview) for change in preview.entries],
+        "rows": [_change_row(change, names, preview) for change in page],
         "has_states": any({e.old_status, e.new_status} != {Status.SCORED} for e in preview.entries),
         "has_gaps": len(ranks) < max(ranks, default=0),
         "has_unranked": any(None in (e.old_rank, e.new_rank) for e in preview.entries),
         "n_rejected_in_both": len(preview.changes) - len(preview.entries),
-        "effects": effects(preview),
     }
+
+
+def newly_rejected(preview: Preview) -> list[Change]:
+    """Return the entries that the published edition scores and this one rejects."""
+    return [
+        entry
+        for entry in preview.entries
+        if (entry.old_status, entry.new_status) == (Status.SCORED, Status.REJECTED)
+    ]
 
 
 def effects(preview: Preview) -> tuple[str, ...]:

@@ -317,3 +317,37 @@ def test_a_former_edition_is_opened_and_closed_again_on_its_pages(keeper: Client
     assert keeper.post(f"{SECOND}discard/", {"reason": "Not yet.", "confirm": "on"}).status_code == 302
     assert "Edition 2 is not in preparation" in main_text(keeper, f"{SECOND}discard/")
     assert "opened again" not in main_text(keeper, HUB)
+
+
+def test_a_comparison_of_many_submissions_has_pages_and_can_show_changed_ranks_alone(
+    keeper: Client, rescored: Edition, owner: User
+) -> None:
+    board = Edition.objects.get(split="test", number=1)
+    for _ in range(50):
+        queue_rows.queued(board, owner)
+    first, second, beyond = (get(keeper, f"{SECOND}{query}") for query in ("", "?page=2", "?page=99"))
+    n_rows = [
+        len(root.one("table", class_="changes").one("tbody").all("tr")) for root in (first, second, beyond)
+    ]
+    assert n_rows == [50, 4, 4]
+    assert effects(first) == effects(second), "sentences are of all submissions"
+    links = [a.attributes["href"] for a in first.one("nav", class_="pages").all("a")]
+    assert links == ["?page=2"]
+    moved = get(keeper, f"{SECOND}?rows=moved")
+    rows = moved.one("table", class_="changes").one("tbody").all("tr")
+    assert rows
+    assert all("moved" in row.classes for row in rows)
+    assert f"Only changed ranks ({len(rows)})" in moved.one("nav", class_="columns").text
+    assert moved.all("nav", class_="pages") == []
+    assert get(keeper, f"{SECOND}?rows=strange&page=x").one("table", class_="changes")
+
+
+def test_publishing_names_fifty_submissions_and_counts_the_rest(
+    keeper: Client, rescored: Edition, owner: User
+) -> None:
+    board = Edition.objects.get(split="test", number=1)
+    for _ in range(52):
+        queue_rows.queued(board, owner)
+    root = get(keeper, f"{SECOND}publish/")
+    assert root.all("table", class_="changes") == []
+    assert root.one("ul", class_="left-out").text.endswith("and 2 more")
