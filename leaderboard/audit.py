@@ -128,8 +128,12 @@ def events(
     noun_id: str = "",
     since: datetime | None = None,
     until: datetime | None = None,
+    people: bool = False,
 ) -> QuerySet[AuditEvent]:
-    """The events that fit, the newest first. `actor` is a part of an e-mail address; `until` is excluded."""
+    """The events that fit, the newest first. `actor` is a part of an e-mail address; `until` is excluded.
+
+    With `people`, only what people did: not what workers and commands did.
+    """
     wanted = {
         "actor__email__icontains": actor,
         "verb": verb,
@@ -137,8 +141,9 @@ def events(
         "noun_id__startswith": noun_id,
         "at__gte": since,
         "at__lt": until,
+        "actor__isnull": False if people else None,
     }
-    given = {name: value for name, value in wanted.items() if value}
+    given = {name: value for name, value in wanted.items() if value not in (None, "")}
     return AuditEvent.objects.filter(**given).select_related("actor").order_by("-pk")
 
 

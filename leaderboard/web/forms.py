@@ -21,6 +21,11 @@ class SiteForm(forms.Form):
         """Return the form with a request's data, or with its initial values."""
         return cls(request.POST if request.method == "POST" else None, **options)
 
+    @property
+    def ignored(self) -> list[str]:
+        """Return the parameters of an address that are no field of the form, but for the number of a page."""
+        return [name for name in self.data if name not in self.fields and name != "page"]
+
     def refuse(self, refusal: Exception) -> None:
         """Put the advice, or else the message, at the field at fault."""
         field = getattr(refusal, "field", "")

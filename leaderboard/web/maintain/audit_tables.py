@@ -12,7 +12,18 @@ from django.utils.dateparse import parse_duration
 
 from leaderboard import audit
 from leaderboard.methods.details import DETAILS
-from leaderboard.models import AuditEvent, Edition, Evaluation, Method, Split, Submission, Team, User
+from leaderboard.models import (
+    AuditEvent,
+    Edition,
+    Evaluation,
+    Method,
+    Split,
+    Submission,
+    Team,
+    User,
+    Visibility,
+)
+from leaderboard.models.benchmark import Listing
 from leaderboard.pages.texts import PAGES
 from leaderboard.quotas.spans import span
 from leaderboard.submissions.status_text import short_fault
@@ -32,6 +43,7 @@ _FIELDS: Final = (
 )
 # Details that name a row by its id.
 _KEYS: Final = {"user": "User", "team": "Team", "from": "Team", "to": "Team", "split": "Split"}
+_CHOICES: Final = {*Visibility.values, *Listing.values}
 _VERBS: Final = {
     "shown": "visibility changed",
     "revealed": "made public on its day",
@@ -137,7 +149,7 @@ def _words(value: Any) -> str:
         more = f" and {n_more:,} more" if n_more > 0 else ""
         return ", ".join(_label(str(each)) for each in value[:MAX_LISTED]) + more
     text = "" if value is None else _PYTHON.sub(lambda match: _WORDS[match[0]], str(value))
-    if text.isupper():  # a choice, as PRIVATE
+    if text in _CHOICES:
         return text.lower()
     text = _SPAN.sub(lambda match: span(time) if (time := parse_duration(match[0])) else "none", text)
     return _MOMENT.sub(r"\1 \2 UTC", _DIGEST.sub(r"\1…", text))
@@ -159,6 +171,8 @@ def _subjects(events: Iterable[AuditEvent]) -> dict[tuple[str, str], Subject]:
             rows = model._default_manager.filter(pk__in=keys).select_related(*related)
             subjects |= {(noun, str(row.pk)): subject_of(row) for row in rows}
     pages = ids["Page"] & set(PAGES)
+    # There is one, which its noun names already.
+    subjects["SiteAnnouncement", "site"] = Subject("")
     return subjects | {
         ("Page", name): Subject(PAGES[name].title, reverse("maintain_page", args=[name])) for name in pages
     }
@@ -173,7 +187,7 @@ def _is_key(model: type[Model], text: str) -> bool:
 
 
 def _submission(row: Submission) -> Subject:
-    about = f"submitted {row.submitted_at:%Y-%m-%d %H:%M} UTC"
+    about = f"{row.method.team.name}, submitted {row.submitted_at:%Y-%m-%d %H:%M} UTC"
     return Subject(f"{row.method.name} on {row.split.title}", reverse("submission", args=[row.pk]), about)
 
 
@@ -193,12 +207,16 @@ _TABLES: Final[Mapping[str, tuple[Any, tuple[str, ...], Callable[[Any], Subject]
     ),
     "Evaluation": (
         Evaluation,
-        ("submission__method", "submission__split", "edition"),
+        ("submission__method__team", "submission__split", "edition"),
         _evaluation,
     ),
-    "Method": (Method, (), lambda row: Subject(row.name, reverse("method", args=[row.pk]))),
+    "Method": (
+        Method,
+        ("team",),
+        lambda row: Subject(row.name, reverse("method", args=[row.pk]), row.team.name),
+    ),
     "Split": (Split, (), lambda row: Subject(row.title, reverse("maintain_split", args=[row.pk]))),
-    "Submission": (Submission, ("method", "split"), _submission),
+    "Submission": (Submission, ("method__team", "split"), _submission),
     "Team": (Team, (), lambda row: Subject(row.name, reverse("maintain_team", args=[row.pk]))),
     "User": (User, (), lambda row: Subject(row.email)),
 }

@@ -51,12 +51,16 @@ class AuditFilter(SiteForm):
     noun = forms.ChoiceField(
         label="Object type", required=False, choices=partial(_occurring, "noun", audit_tables.noun_words)
     )
+    people = forms.ChoiceField(
+        label="Done by", required=False, choices=[("", "anyone"), ("only", "people only")]
+    )
     noun_id = forms.CharField(required=False, max_length=80, widget=forms.HiddenInput)
     since = _day("From")
     until = _day("To")
 
     def wanted(self) -> dict[str, Any]:
         fields = {name: value for name, value in self.cleaned_data.items() if value}
+        fields["people"] = "people" in fields
         if "since" in fields:
             fields["since"] = _midnight(fields["since"])
         if "until" in fields:

@@ -129,7 +129,7 @@ def test_events_have_names_and_links_and_the_words_of_people(
     audit.record(verb="imported", noun="PublishedResult", noun_id="https://p", details={"added": ["r"] * 300})
     page = keeper.get(PAGE)
     by_verb = {row[3]: row for row in rows(page)}
-    assert by_verb["visibility changed"][4] == "Method Owl net private → public"
+    assert by_verb["visibility changed"][4] == "Method Owl net, Owls private → public"
     assert by_verb["changed"][4] == "Split Test needs admission: no → yes"
     [imported] = [row for row in rows(page) if row[4].startswith("Published result")]
     assert imported[4].endswith("added: r, r, r, r, r and 295 more")
@@ -146,7 +146,7 @@ def test_an_evaluation_names_its_edition_and_why_its_file_was_rejected(
         builders.submit(owner, data, method=method)
     builders.score_all()
     sent = {
-        row.method.name: f"submitted {row.submitted_at:%Y-%m-%d %H:%M} UTC"
+        row.method.name: f"Owls, submitted {row.submitted_at:%Y-%m-%d %H:%M} UTC"
         for row in Submission.objects.all()
     }
     broken, owl = sorted(row[4] for row in rows(keeper.get(PAGE)) if row[3] in {"scored", "rejected"})
@@ -183,6 +183,55 @@ def test_an_override_has_the_labels_of_its_form_and_its_reason_comes_last(
         "time window: 2 days",
     ]
     assert details.endswith("; reason: A deadline.")
+
+
+def test_equal_names_are_told_apart_by_their_teams(
+    keeper: Client, edition: Edition, owner: User, stranger: User
+) -> None:
+    for user in (owner, stranger):
+        builders.submit(user, builders.predictions(edition), method="Net", visibility="PRIVATE")
+    sent = [row[4] for row in rows(keeper.get(PAGE)) if row[3] == "submitted"]
+    assert [text.split(", ")[1] for text in sent] == ["Strangers", "Owls"]
+
+
+def test_an_announcement_is_named_once_and_times_are_readable(keeper: Client, maintainer: User) -> None:
+    audit.record(
+        verb="announced",
+        noun="SiteAnnouncement",
+        noun_id="site",
+        actor=maintainer,
+        details={"text": "MAINTENANCE", "ends_at": "2026-12-02T00:00:00+00:00"},
+    )
+    [row] = rows(keeper.get(PAGE))
+    assert row[4] == "Announcement of the site text: MAINTENANCE; ends at: 2026-12-02 00:00 UTC"
+
+
+def test_actions_of_people_are_shown_and_exported_without_those_of_machines(
+    keeper: Client, trail: None
+) -> None:
+    for query in ("people=only", "people=only&verb="):
+        assert [row[2] for row in rows(keeper.get(f"{PAGE}?{query}"))] == [
+            "stranger@example.org",
+            "owner@example.org",
+        ]
+    assert len(json.loads(text_of(keeper.get(f"{JSON}?people=only")))) == 2
+    [link] = [a for a in pages.get(keeper, f"{PAGE}?people=only").all("a") if a.text == "JSON"]
+    assert len(json.loads(text_of(keeper.get(link.attributes["href"])))) == 2
+
+
+@pytest.mark.parametrize("address", [PAGE, "/maintain/teams/", "/maintain/queue/"])
+def test_a_filter_that_a_page_does_not_have_is_said_not_to_apply(
+    keeper: Client, trail: None, address: str
+) -> None:
+    answer = assert_sound(keeper.get(f"{address}?q=owls&page=1&<b>=2"))
+    assert "Not applied: “q”, “<b>”. This page has no such filter." in answer.one("main").text
+    assert "Not applied" not in assert_sound(keeper.get(f"{address}?page=1")).one("main").text
+
+
+def test_the_page_of_a_team_has_its_name_alone_as_title(keeper: Client, owner: User) -> None:
+    team = teams.team_of(user=owner)
+    title = pages.get(keeper, f"/maintain/teams/{team.pk}/").one("title").text
+    assert title.startswith("Owls: team")
 
 
 # --- the role of a maintainer ----------------------------------------------------------------------------

@@ -67,7 +67,7 @@ def test_desk_shows_each_split_with_its_board_and_what_is_prepared(keeper: Clien
     assert draft.startswith("Test, edition 2 draft since")
     assert "0%. 0 of 4 submissions finished." in draft
     assert "none: no ground truth yet" in val
-    assert "python manage.py import_truth val PATH" in main_text(keeper, "/maintain/val/open/")
+    assert "tsttc-maintain import_truth val PATH" in main_text(keeper, "/maintain/val/open/")
     bar = root.one("progress")
     assert (bar.attributes["value"], bar.attributes["max"]) == ("0", "4")
 

@@ -47,7 +47,7 @@ def test_edition_is_opened_with_an_imported_truth_and_a_protocol(
 def test_opening_says_that_values_are_never_uploaded(keeper: Client, rescored: Edition) -> None:
     root = get(keeper, OPEN)
     assert "You cannot upload ground truth here" in root.one("main").text
-    assert "python manage.py open_edition test --truth PATH" in root.one("pre").text
+    assert "tsttc-maintain open_edition test --truth PATH" in root.one("pre").text
     assert root.all("input", type="file") == []
     offered = [field.attributes["value"] for field in root.all("input", type="radio", name="digest")]
     assert set(offered) == set(GroundTruth.objects.values_list("pk", flat=True))
