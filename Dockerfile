@@ -27,7 +27,8 @@ RUN apt-get update -qq \
 RUN groupadd --gid 10001 tsttc \
     && useradd --uid 10001 --gid tsttc --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin tsttc \
     && install -d -o tsttc -g tsttc -m 0750 /var/lib/tsttc /var/lib/tsttc/files \
-    && install -d -o tsttc -g tsttc -m 0700 /var/lib/tsttc/ground-truth /var/lib/tsttc/bags /var/lib/tsttc/certificates
+    && install -d -o tsttc -g tsttc -m 0700 /var/lib/tsttc/ground-truth /var/lib/tsttc/bags /var/lib/tsttc/certificates \
+        /var/lib/tsttc/buffers
 
 COPY --from=environment /opt/tsttc /opt/tsttc
 WORKDIR /srv/tsttc

@@ -385,9 +385,10 @@ METRICS_NETWORKS = environment.networks("TSTTC_METRICS_NETWORKS", default=["127.
 CONTENT_SECURITY_POLICY = middleware_order.content_security_policy(SOCIALACCOUNT_PROVIDERS)
 SESSION_ENGINE = "leaderboard.web.middleware.sessions"
 CSRF_COOKIE_HTTPONLY = True
+# Below /api/ http is refused: a client would take a redirect for success, or follow it without the file.
+SECURE_REDIRECT_EXEMPT = [r"^healthz$", r"^readyz$", r"^healthy$", r"^metrics$", r"^api/"]
 if PRODUCTION and env.bool("TSTTC_HTTPS", default=True):
     SECURE_SSL_REDIRECT = True
-    SECURE_REDIRECT_EXEMPT = [r"^healthz$", r"^readyz$", r"^healthy$", r"^metrics$"]
     SECURE_PROXY_SSL_HEADER = ("HTTP_X_FORWARDED_PROTO", "https")
     SECURE_HSTS_SECONDS = 365 * 24 * 3600
     SECURE_HSTS_INCLUDE_SUBDOMAINS = True

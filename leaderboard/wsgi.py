@@ -6,6 +6,7 @@ from django.core.exceptions import ImproperlyConfigured
 from django.core.wsgi import get_wsgi_application
 
 from leaderboard.ops import environment
+from leaderboard.web.middleware.unread_bodies import reading_to_the_end
 
 if environment.PROCESS != "web":
     # It would sign sessions and receipts with a key that ends with it.
@@ -14,4 +15,4 @@ if environment.PROCESS != "web":
     )
 os.environ.setdefault("DJANGO_SETTINGS_MODULE", "leaderboard.settings")
 
-application = get_wsgi_application()
+application = reading_to_the_end(get_wsgi_application())

@@ -4,10 +4,18 @@ import hashlib
 import math
 from collections.abc import Callable
 
+from django.conf import settings
 from django.http import HttpRequest, HttpResponse, HttpResponseNotModified
 
 from leaderboard.api.throttling import counted
+from leaderboard.errors import problem_codes
 from leaderboard.http_caching import is_known
+
+# Not a redirect, as for pages: curl takes that for success, or follows it without the file.
+HTTPS_REQUIRED = (
+    "The address begins with http://; expected https://. Nothing was done. If the request had a token, "
+    "others on the network could read it: revoke it."
+)
 
 Next = Callable[[HttpRequest], HttpResponse]
 
@@ -17,9 +25,11 @@ class ApiHeadersMiddleware:
         self._get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponse:
-        response = self._get_response(request)
         if not request.path.startswith("/api/"):
-            return response
+            return self._get_response(request)
+        if settings.SECURE_SSL_REDIRECT and not request.is_secure():
+            return problem_codes.response(status=403, code="https-required", detail=HTTPS_REQUIRED)
+        response = self._get_response(request)
         response = _conditional(request, response)
         throttles = counted(request)
         if throttles:

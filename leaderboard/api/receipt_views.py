@@ -2,7 +2,7 @@
 
 from typing import cast
 
-from django.http import FileResponse, HttpResponse, HttpResponseBase, HttpResponseNotModified
+from django.http import HttpResponse, HttpResponseBase, HttpResponseNotModified
 from django.shortcuts import get_object_or_404
 from drf_spectacular.utils import OpenApiParameter, extend_schema
 from rest_framework.request import Request
@@ -13,6 +13,7 @@ from leaderboard.api.schema import errors
 from leaderboard.api.views import visible
 from leaderboard.http_caching import is_known
 from leaderboard.models import Submission, User
+from leaderboard.ops import downloads
 from leaderboard.storage import files
 from leaderboard.submissions import receipts
 
@@ -48,8 +49,10 @@ class FileView(APIView):
         tag = {"ETag": f'"{submission.digest}"'}
         if is_known(request._request, tag["ETag"]):
             return HttpResponseNotModified(headers=tag)
-        return FileResponse(
-            files.open_named(files.predictions_name(submission.digest)),
+        file = files.open_named(files.predictions_name(submission.digest))
+        return downloads.file_response(
+            file,
+            n_bytes=file.size,
             as_attachment=True,
             filename=submission.filename or "predictions.json",
             content_type="application/octet-stream",

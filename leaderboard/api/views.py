@@ -2,7 +2,7 @@
 
 from typing import cast
 
-from django.http import FileResponse, Http404, HttpResponseBase, HttpResponseNotModified, JsonResponse
+from django.http import Http404, HttpResponseBase, HttpResponseNotModified, JsonResponse
 from django.shortcuts import get_object_or_404
 from django.utils import timezone
 from drf_spectacular.utils import OpenApiParameter, extend_schema
@@ -22,6 +22,7 @@ from leaderboard.exports import croissant
 from leaderboard.http_caching import is_known
 from leaderboard.models import Edition, Split, Submission, User
 from leaderboard.models.submissions import SubmissionQuerySet
+from leaderboard.ops import downloads
 from leaderboard.storage import files
 from leaderboard.submissions import intake, outcomes
 
@@ -95,8 +96,10 @@ class ManifestView(APIView):
         tag = {"ETag": f'"{digest}"'}
         if is_known(request._request, tag["ETag"]):
             return HttpResponseNotModified(headers=tag)
-        return FileResponse(
-            files.open_named(files.manifest_name(digest)),
+        file = files.open_named(files.manifest_name(digest))
+        return downloads.file_response(
+            file,
+            n_bytes=file.size,
             as_attachment=True,
             filename=f"tsttc-{row.pk}-manifest.csv",
             content_type="text/csv",

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import structlog
 from django.db import InterfaceError, OperationalError
 
+from leaderboard.ops import downloads
 from leaderboard.storage.files import FULL, StoreUnavailable
 
 log = structlog.get_logger(__name__)
@@ -56,8 +57,19 @@ STORAGE_FULL = Outage(
 )
 
 
+BUSY = Outage(
+    status=503,
+    code="site-busy",
+    title="Too many files are being sent",
+    sentence="The site sends other large files at the moment; please try again in a few seconds.",
+    retry_after_s=5,
+)
+
+
 def outage_of(fault: BaseException | None) -> Outage | None:
     """Return the outage that a fault is a sign of, if any."""
+    if isinstance(fault, downloads.TooManyDownloads):
+        return BUSY
     if isinstance(fault, OperationalError | InterfaceError):
         # The driver's own exception, which knows PostgreSQL's code.
         is_full = getattr(fault.__cause__, "sqlstate", None) == POSTGRESQL_DISK_FULL
@@ -74,6 +86,8 @@ def outage_of(fault: BaseException | None) -> Outage | None:
 def answered(fault: BaseException | None) -> Outage | None:
     """Return the outage that a fault is a sign of, and log it, since it becomes an answer."""
     outage = outage_of(fault)
-    if outage is not None:
+    if outage is BUSY:
+        log.warning("too_many_downloads")
+    elif outage is not None:
         log.error("outage", code=outage.code, reason=f"{type(fault).__name__}: {fault}"[:300])
     return outage

@@ -36,6 +36,7 @@ API_GROUPS: Final[dict[str, dict[str, str]]] = {
         "account-closed": "The account that the token belongs to is closed.",
         "token-scope": "The token does not have the scope for this.",
         "token-split": "The token is valid for one split only, and the request affects another or all.",
+        "https-required": "The request came over http. Its token can have been read by others: revoke it.",
         "permission-denied": "The account may not do this.",
         "not-maintainer": "Only maintainers may do this.",
         "not-yours": "Only the team that sent a submission may do this.",
@@ -97,6 +98,7 @@ API_GROUPS: Final[dict[str, dict[str, str]]] = {
         "database-unavailable": "The database does not answer at the moment.",
         "store-unavailable": "The file store does not answer at the moment.",
         "storage-full": "There is no space left to store a file.",
+        "site-busy": "The site restarts, or sends too much already; repeat after `Retry-After` seconds.",
         "server-error": "Something failed on our side; it is in our logs.",
     },
 }
@@ -107,7 +109,7 @@ _CODES_BY_STATUS: Final[dict[int, str]] = {
     "bad-filter unknown-column bad-comparison",
     401: "not-authenticated authentication-failed token-malformed token-unknown token-expired token-revoked "
     "account-closed",
-    403: "token-scope token-split not-admitted permission-denied not-maintainer",
+    403: "https-required token-scope token-split not-admitted permission-denied not-maintainer",
     404: "not-found not-on-the-board edition-unknown",
     405: "method-not-allowed",
     406: "not-acceptable",
@@ -116,7 +118,7 @@ _CODES_BY_STATUS: Final[dict[int, str]] = {
     415: "unsupported-media-type",
     429: "throttled quota-exceeded",
     500: "server-error",
-    503: "database-unavailable store-unavailable",
+    503: "database-unavailable store-unavailable site-busy",
     507: "storage-full",
 }
 _BY_CODE: Final = {code: status for status, codes in _CODES_BY_STATUS.items() for code in codes.split()}

@@ -219,7 +219,10 @@ def _checked(upload: "File[bytes] | None") -> "File[bytes]":
 
 def too_large(*, n_bytes: int) -> str:
     most = settings.MAX_PREDICTIONS_BYTES
-    return f"The file is {file_size(n_bytes)}; expected at most {file_size(most)}."
+    return (
+        f"The file is {file_size(n_bytes)}; expected at most {file_size(most)}. "
+        "gzip makes a prediction file much smaller: send FILE.json.gz."
+    )
 
 
 def _clean_filename(name: str) -> str:

@@ -3,10 +3,15 @@
 import configparser
 import json
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 import yaml
+from django.conf import settings
+
+from leaderboard.errors import problem_codes
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 DEPLOY = REPOSITORY / "deploy"
@@ -36,7 +41,7 @@ def test_alarms_ask_for_figures_that_there_are_and_say_what_is_wrong() -> None:
     text = (DEPLOY / "prometheus/scrape.yml").read_text()
     assert "127.0.0.1:8000" in text
     assert "web:8000" in text
-    assert "reverse_proxy web:8000" in (DEPLOY / "Caddyfile").read_text()
+    assert "set $tsttc_web web:8000;" in (DEPLOY / "nginx.compose.conf").read_text()
 
 
 def test_the_board_of_grafana_shows_figures_that_there_are() -> None:
@@ -83,40 +88,100 @@ def test_only_the_worker_can_read_the_ground_truth() -> None:
     assert "ReadOnlyPaths=/var/lib/tsttc/ground-truth" in worker
 
 
-@pytest.mark.parametrize("name", ["nginx.conf", "Caddyfile", "Caddyfile.host"])
-def test_proxies_take_uploads_and_hide_the_figures(name: str) -> None:
+NGINX = ("nginx.conf", "nginx.compose.conf")
+RULES = (DEPLOY / "nginx-rules.conf").read_text()
+
+
+@pytest.mark.parametrize("name", ["nginx-rules.conf", *NGINX, "Caddyfile"])
+def test_files_of_proxies_close_what_they_open(name: str) -> None:
+    text = re.sub(r"#.*|'[^']*'|\"[^\"]*\"", "", (DEPLOY / name).read_text())
+    assert text.count("{") == text.count("}") > 0
+
+
+def test_nginx_keeps_whole_requests_and_answers_and_counts_them_for_each_visitor() -> None:
+    assert re.findall(r"proxy_(?:request_)?buffering (\w+);", RULES) == ["on", "on"]
+    for address in ("/submit/", "/api/v1/submissions"):
+        [rules] = re.findall(rf"location = {address} \{{(.*?)\}}", RULES, re.DOTALL)
+        assert "client_max_body_size 21m;" in rules
+        # Named here, each: a `limit_conn` of a location takes the place of those around it.
+        assert re.findall(r"limit_conn (\w+) \d+;", rules) == ["tsttc_requests", "tsttc_uploads"]
+    assert re.search(r"location = /metrics \{\s+return 404", RULES)
+    for name in NGINX:
+        text = (DEPLOY / name).read_text()
+        assert text.count("nginx-rules.conf;") == 1
+        assert set(re.findall(r"zone=(\w+):", text)) == {"tsttc_requests", "tsttc_uploads"}
+
+
+def test_caddy_keeps_no_request_and_passes_everything_to_nginx() -> None:
+    text = (DEPLOY / "Caddyfile").read_text()
+    assert "request_buffers" not in text
+    assert set(re.findall(r"reverse_proxy (\S+)", text)) == {"buffer:8080"}
+    assert "listen 8080;" in (DEPLOY / "nginx.compose.conf").read_text()
+
+
+@pytest.mark.parametrize("name", ["nginx-rules.conf", "nginx.conf"])
+def test_what_nginx_answers_itself_are_problem_documents_below_api_and_pages_elsewhere(name: str) -> None:
     text = (DEPLOY / name).read_text()
-    assert text.count("{") == text.count("}")
-    assert "/submit/" in text
-    assert "/api/v1/submissions" in text
-    assert re.search(r"/metrics \{\s+(return|respond) 404", text)
+    answers = re.findall(r"default_type (\S+);[^{}]*return (\d+) '(.*)\\n';", text)
+    assert len(answers) == text.count("default_type") > 0
+    for media_type, status, body in answers:
+        if media_type == "text/html":
+            assert re.search(r"<h1>.*</h1><p>.*[.]", body)
+            continue
+        assert media_type == problem_codes.MEDIA_TYPE
+        document = json.loads(body.replace("https://$host", settings.SITE_URL))
+        assert int(status) in problem_codes.STATUSES[document["code"]]
+        assert document == problem_codes.document(
+            status=int(status),
+            code=document["code"],
+            detail=document["detail"],
+            where=document["problems"][0]["where"],
+        )
 
 
-@pytest.mark.parametrize("name", ["Caddyfile", "Caddyfile.host"])
-def test_caddy_keeps_every_request_back_until_it_is_whole(name: str) -> None:
+def test_what_is_too_large_is_answered_with_the_limit_and_with_gzip() -> None:
+    large = re.findall(r"return 413 '(.*)'", RULES)
+    assert len(large) == 2
+    limit = f"{settings.MAX_PREDICTIONS_BYTES // 10**6} MB"
+    assert [text for text in large if limit not in text or "gzip" not in text] == []
+
+
+def test_http_is_not_redirected_below_api() -> None:
+    caddy = (DEPLOY / "Caddyfile").read_text().partition("http://{$TSTTC_SITE_HOST} {")[2]
+    assert re.match(r".*handle /api/\* \{\s+reverse_proxy.*handle \{\s+redir", caddy, re.DOTALL)
+    http = (DEPLOY / "nginx.conf").read_text().partition("listen 443")[0]
+    assert re.search(r"location /api/ \{[^{}]*return 403 .*https-required", http)
+    # nginx looks at the size before anything else.
+    assert "client_max_body_size 0;" in http
+
+
+@pytest.mark.skipif(shutil.which("nginx") is None, reason="nginx is not installed")
+@pytest.mark.parametrize("name", NGINX)
+def test_nginx_understands_its_files(name: str, tmp_path: Path) -> None:
     text = (DEPLOY / name).read_text()
-    # What compose sets where nobody says otherwise.
-    text = text.replace("{$TSTTC_MAX_REQUEST_SIZE}", "21MB")
-    passed_on = re.findall(r"max_size (\S+)\s+\}\s+reverse_proxy \S+ \{\s+request_buffers (\S+)\s+\}", text)
-    assert len(passed_on) == text.count("reverse_proxy") == 2
-    assert [buffer for size, buffer in passed_on if n_bytes(buffer) <= n_bytes(size)] == []
-    assert re.search(r"timeouts \{[^}]*read_body \dm", text)
-
-
-def n_bytes(text: str) -> int:
-    """What Caddy understands by a size: "21MB"."""
-    number, unit = re.fullmatch(r"(\d+)([KMG])B", text).groups()  # type: ignore[union-attr]  # else it fails
-    return int(number) * {"K": 10**3, "M": 10**6, "G": 10**9}[unit]
-
-
-def test_nginx_keeps_every_request_back_until_it_is_whole() -> None:
-    text = (DEPLOY / "nginx.conf").read_text()
-    assert re.findall(r"proxy_request_buffering (\w+);", text) == ["on"]
-    assert "proxy_set_header X-Forwarded-Proto https;" in text
+    # Without what only a server has: a certificate, ports, names of containers.
+    text = re.sub(r"ssl_certificate\S* .*;|listen \[::\].*;", "", text).replace(
+        "listen 443 ssl;", "listen 8443;"
+    )
+    text = text.replace("listen 80;", "listen 8088;").replace("/dev/stderr", str(tmp_path / "log"))
+    text = re.sub(r"include \S+/nginx-rules.conf;", f"include {DEPLOY / 'nginx-rules.conf'};", text)
+    text = re.sub(r"(/tmp|/var/lib/tsttc/buffers)/(?=[a-z])", f"{tmp_path}/", text)
+    if "http {" not in text:
+        folders = "".join(
+            f"{kind}_temp_path {tmp_path}/{kind};"
+            for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+        )
+        text = f"pid {tmp_path}/pid; events {{}} http {{ {folders} access_log off; {text} }}"
+    path = tmp_path / "whole.conf"
+    path.write_text(text)
+    command = ["nginx", "-t", "-e", str(tmp_path / "early"), "-c", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_no_proxy_passes_on_what_would_move_the_site() -> None:
-    assert "underscores_in_headers off;" in (DEPLOY / "nginx.conf").read_text()
-    for name in ("Caddyfile", "Caddyfile.host"):
-        before, _, _ = (DEPLOY / name).read_text().partition("reverse_proxy")
-        assert "\trequest_header -*_*\n" in before, name
+    assert "underscores_in_headers off;" in RULES
+    assert "proxy_set_header X-Forwarded-Proto $tsttc_scheme;" in RULES
+    assert "set $tsttc_scheme https;" in (DEPLOY / "nginx.conf").read_text()
+    _, _, https = (DEPLOY / "Caddyfile").read_text().partition("https://{$TSTTC_SITE_HOST} {")
+    assert "\trequest_header -*_*\n" in https.partition("reverse_proxy")[0]

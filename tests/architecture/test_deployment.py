@@ -65,6 +65,8 @@ def test_every_service_is_without_privileges_and_has_limits(name: str) -> None:
     assert service.get("cap_add", []) == (["NET_BIND_SERVICE"] if name == "proxy" else [])
     assert "no-new-privileges:true" in service["security_opt"]
     assert service["mem_limit"]
+    # Docker keeps every line of a log otherwise.
+    assert set(service["logging"]["options"]) == {"max-size", "max-file"}
     assert service["pids_limit"]
     if name not in OURS:
         assert service["user"] not in {"root", "0"}
@@ -74,6 +76,7 @@ def test_networks_are_for_one_purpose_each_and_workers_have_no_way_out() -> None
     networks = {name: set(service["networks"]) for name, service in SERVICES.items()}
     assert networks == {
         "proxy": {"pages"},
+        "buffer": {"pages"},
         "web": {"pages", "database", "broker"},
         "worker": {"database", "broker"},
         "mailer": {"pages", "database"},

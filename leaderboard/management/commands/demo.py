@@ -19,8 +19,6 @@ from leaderboard.demo.supervisor import Process, StartFailed, port_is_free, supe
 from leaderboard.management.commands.build_wheel import build, is_built
 from leaderboard.models import Split
 
-# What a multipart body has beside the file.
-FORM_BYTES = 1_000_000
 # Connections at once, half-open ones among them: fewer than the files that a process may open.
 MAX_CONNECTIONS = 900
 SILENT_S = 20
@@ -108,7 +106,8 @@ def processes(host: str, port: int, *, address: str) -> list[Process]:
     }
     web = [
         *(sys.executable, "-m", "waitress", f"--host={host}", f"--port={port}", "--threads=8"),
-        f"--max-request-body-size={settings.MAX_PREDICTIONS_BYTES + FORM_BYTES}",
+        # What is too large the application says, in the words of the page or the API.
+        f"--max-request-body-size={10 * settings.MAX_PREDICTIONS_BYTES}",
         *(f"--connection-limit={MAX_CONNECTIONS}", f"--channel-timeout={SILENT_S}", "--asyncore-use-poll"),
         "leaderboard.wsgi:application",
     ]

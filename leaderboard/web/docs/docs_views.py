@@ -3,10 +3,11 @@
 Most answer without the database. Long pages are compressed here: not every site has a proxy that does so.
 """
 
+import threading
 from collections.abc import Mapping
 from typing import Any, Final
 
-from django.http import FileResponse, Http404, HttpRequest, HttpResponse, HttpResponseBase
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import render
 from django.urls import reverse
 from django.urls.converters import StringConverter
@@ -16,12 +17,18 @@ from django.views.decorators.gzip import gzip_page
 from django.views.decorators.http import require_safe
 
 from leaderboard.boards.snapshots import splits_of
+from leaderboard.ops import downloads, rate_limits
 from leaderboard.pages import texts
 from leaderboard.pages.texts import PAGES
 from leaderboard.web import markdown
 from leaderboard.web.docs import api_examples, api_reference, guides, reference, search, wheels
 from leaderboard.web.docs.guides import GuideLink
 from leaderboard.web.markdown import TextHeading
+
+# A search reads every guide, so a process makes few at a time, and has threads left for other pages.
+SEARCHES_AT_ONCE: Final = 2
+AGAIN_S: Final = 1
+_searching: Final = threading.BoundedSemaphore(SEARCHES_AT_ONCE)
 
 _CHAPTERS_OF_API: Final = [
     *(TextHeading(3, title, f"group-{slugify(title)}") for title in api_reference.GROUPS),
@@ -78,7 +85,15 @@ def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
 @require_safe
 def find(request: HttpRequest) -> HttpResponse:
     query = " ".join(request.GET.get("q", "").replace("\x00", " ").split())[: search.MAX_QUERY]
-    hits = search.find(query) if query else []
+    if not _searching.acquire(blocking=False):
+        sentence = rate_limits.refusal(AGAIN_S)
+        response = render(request, "429.html", {"sentence": sentence}, status=429)
+        response["Retry-After"] = str(AGAIN_S)
+        return response
+    try:
+        hits = search.find(query) if query else []
+    finally:
+        _searching.release()
     navigation = _navigation(request.path)
     context = {"navigation": navigation, "query": query, "hits": hits, "most": search.MAX_HITS}
     return render(request, "docs/search.html", context)
@@ -147,4 +162,7 @@ def dist_file(request: HttpRequest, wheel_name: str) -> HttpResponseBase:
     path = next((each for each in wheels.files() if each.name == wheel_name), None)
     if path is None:
         raise Http404(f"There is no wheel {wheel_name!r}.")
-    return FileResponse(path.open("rb"), as_attachment=True, content_type="application/zip")
+    n_bytes = path.stat().st_size
+    return downloads.file_response(
+        path.open("rb"), n_bytes=n_bytes, as_attachment=True, content_type="application/zip"
+    )

@@ -6,7 +6,7 @@ from django.utils import timezone
 from pytest_django import DjangoAssertNumQueries
 
 from leaderboard.models import Edition, Split
-from leaderboard.web.docs import guides, search
+from leaderboard.web.docs import docs_views, guides, search
 from tests import pages
 from tests.leaderboard.web.test_every_page import assert_sound
 
@@ -192,6 +192,23 @@ def test_the_first_eight_words_of_a_search_count_however_they_are_joined() -> No
     assert search.find("edition " + " ".join(names)) != []
     # Each word of a search is looked for in every part: this one would be 43 words, and then 43 again.
     assert search.find("-".join("abcdefghijklmnopqrstuvwxyz")) == search.find("a b c") == []
+
+
+def test_a_search_too_many_at_once_is_refused_and_leaves_threads_for_others(
+    client: Client, benchmark: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    statuses: list[int] = []
+
+    def meanwhile(query: str) -> list[search.Hit]:
+        statuses.append(client.get(f"/docs/search/?q={query}").status_code)
+        return []
+
+    monkeypatch.setattr(search, "find", meanwhile)
+    answer = client.get("/docs/search/?q=quota")
+    assert statuses == [429] + [200] * (docs_views.SEARCHES_AT_ONCE - 1)
+    assert (answer.status_code, statuses[0]) == (200, 429)
+    monkeypatch.undo()
+    assert client.get("/docs/search/?q=quota").status_code == 200
 
 
 def test_a_page_of_several_sections_lists_them_and_each_link_has_its_heading(
