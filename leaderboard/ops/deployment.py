@@ -1,7 +1,10 @@
 """Checks of `check --deploy`: variables, and the services that they name, without addresses or passwords."""
 
 import os
+import smtplib
+import ssl
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any, Final
 from urllib.parse import urlsplit
 
@@ -9,10 +12,12 @@ from django.conf import settings
 from django.core.checks import CheckMessage, Error
 from django.core.checks import Warning as Caution
 from django.core.files.storage import storages
+from django.core.mail import get_connection
 from django.http.request import validate_host
 
 from leaderboard.ops import environment, health
 
+_MAIL_FAULTS: Final = (OSError, smtplib.SMTPException)
 _BROKERS: Final = ("redis://", "rediss://", "redis+socket://", "amqp://", "amqps://")
 
 
@@ -27,6 +32,11 @@ def check_variables(app_configs: object = None, **kwargs: Any) -> list[CheckMess
     if environment.PROCESS == "web" and not settings.SENDS_MAIL:
         message = "TSTTC_EMAIL_URL is not set: mails go to standard output, and no address is confirmed."
         messages.append(Caution(message, id="leaderboard.W003"))
+    if settings.SENDS_MAIL and settings.DEFAULT_FROM_EMAIL.endswith("@localhost"):
+        message = (
+            "TSTTC_FROM_EMAIL is not set: mails come from leaderboard@localhost, which mail servers refuse."
+        )
+        messages.append(Caution(message, id="leaderboard.W004"))
     return messages
 
 
@@ -46,13 +56,48 @@ def check_services(app_configs: object = None, **kwargs: Any) -> list[CheckMessa
             faults.append(f"The file store does not answer: {type(fault).__name__}.")
         if not settings.FILES_URL and not _can_be_written(str(settings.FILES_DIR)):
             faults.append(f"TSTTC_FILES_DIR is {settings.FILES_DIR}, which this account cannot write to.")
+    if settings.SENDS_MAIL:
+        faults += _mail_server()
     return [Error(sentence, id="leaderboard.E003") for sentence in faults]
+
+
+def _mail_server() -> Iterator[str]:
+    """Connect to the mail server and sign in; send nothing."""
+    connection = get_connection()
+    try:
+        connection.open()
+    except _MAIL_FAULTS as fault:
+        yield (
+            f"The mail server of TSTTC_EMAIL_URL does not let the site in ({_reason(fault)}). "
+            "Without it, no code for signing in arrives."
+        )
+    finally:
+        with suppress(*_MAIL_FAULTS):
+            connection.close()
+
+
+def _reason(fault: Exception) -> str:
+    """Say what a mail server answered, without address and password."""
+    if isinstance(fault, smtplib.SMTPAuthenticationError):
+        return f"it refuses user or password, code {fault.smtp_code}"
+    if isinstance(fault, smtplib.SMTPNotSupportedError):
+        return "it offers no sign-in or no encryption; does the port fit smtp+tls or smtp+ssl?"
+    if isinstance(fault, smtplib.SMTPResponseException):
+        return f"it answers with code {fault.smtp_code}"
+    if isinstance(fault, ssl.SSLError):
+        return "the encrypted connection fails; does the port fit smtp+tls or smtp+ssl?"
+    return getattr(fault, "strerror", None) or type(fault).__name__
 
 
 def _addresses() -> Iterator[str]:
     site = urlsplit(settings.SITE_URL)
     if site.scheme not in {"http", "https"} or not site.hostname or site.path:
         yield f"TSTTC_SITE_URL is {settings.SITE_URL!r}; expected an address such as https://board.example.org."
+    elif site.scheme == "http":
+        yield (
+            f"TSTTC_SITE_URL is {settings.SITE_URL!r}; expected https, since browsers send the cookie of a "
+            "session over https only."
+        )
     elif not validate_host(site.hostname, settings.ALLOWED_HOSTS):
         yield f"TSTTC_ALLOWED_HOSTS lacks {site.hostname}, the host of TSTTC_SITE_URL."
     if environment.PROCESS in {"web", "worker", "maintainer"} and not settings.CELERY_BROKER_URL.startswith(

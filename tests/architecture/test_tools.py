@@ -33,6 +33,15 @@ def test_the_production_profile_passes_the_deployment_checks(production: dict[st
     assert sorted(re.findall(r"\(leaderboard\.(\w+)\) (.*)", output)) == [
         ("E003", "The broker of TSTTC_BROKER_URL does not answer."),
         ("E003", "The database of TSTTC_DATABASE_URL does not answer, or does not know the account."),
+        (
+            "E003",
+            "The mail server of TSTTC_EMAIL_URL does not let the site in (Connection refused). "
+            "Without it, no code for signing in arrives.",
+        ),
+        (
+            "W004",
+            "TSTTC_FROM_EMAIL is not set: mails come from leaderboard@localhost, which mail servers refuse.",
+        ),
         ("I001", "The pages give the sender of mails, leaderboard@localhost, as the contact."),
         (
             "I002",
@@ -63,6 +72,12 @@ def test_all_that_is_wrong_with_a_deployment_is_reported_at_once(production: dic
     assert [name for name in wrong if name not in output] == []
     assert "TSTTC_QUOTA is read by nothing; did you mean TSTTC_QUOTAS?" in output
     assert "Traceback" not in output
+    output = says(
+        sys.executable,
+        *DEPLOYMENT_CHECK,
+        environment=production | {"TSTTC_SITE_URL": "http://board.example.org"},
+    )
+    assert "expected https" in output
 
 
 @pytest.mark.slow
