@@ -9,6 +9,7 @@ from django.core.management.base import BaseCommand, CommandError
 from evaluator import Rejected
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import User
+from leaderboard.people import addresses
 
 
 class RefusingCommand(BaseCommand):
@@ -34,7 +35,7 @@ class AccountCommand(RefusingCommand):
 
 
 def account_of(options: Mapping[str, Any]) -> User:
-    user = User.objects.filter(email=options["email"].strip().lower()).first()
+    user = User.objects.filter(email=addresses.stored(options["email"])).first()
     if user is None:
         raise CommandError("There is no account with that address; expected the primary address of one.")
     return user

@@ -18,7 +18,7 @@ from leaderboard.models.mails import Mail, MailKind
 from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
 from leaderboard.models.pages import PageVersion
 from leaderboard.models.people import AccountChange, ApiToken, Invitation, Membership, Scope, Team, User
-from leaderboard.models.quotas import Admission, QuotaOverride, SpentMailbox
+from leaderboard.models.quotas import Admission, OldAddress, QuotaOverride, SpentMailbox
 from leaderboard.models.submissions import (
     Evaluation,
     Score,

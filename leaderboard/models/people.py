@@ -5,12 +5,15 @@ from typing import Any, ClassVar
 
 from django.contrib.auth.base_user import AbstractBaseUser, BaseUserManager
 from django.contrib.auth.models import PermissionsMixin
+from django.core.exceptions import ValidationError
 from django.db import models
 from django.db.models import Case, F, Value, When
 from django.db.models.functions import Concat, Lower, StrIndex, Substr
 from django.db.models.lookups import GreaterThan, LessThan
 from django.utils import timezone
 from knox.models import AbstractAuthToken
+
+from leaderboard.models.addresses import fault_of, spelled
 
 # Where an address has a plus sign and where its @, from 1; 0: nowhere.
 _PLUS, _AT = StrIndex("email", Value("+")), StrIndex("email", Value("@"))
@@ -24,21 +27,24 @@ MAILBOX = Lower(
         output_field=models.CharField(),
     )
 )
-"""An address in small letters, without what follows a plus sign before the @: the mailbox that it leads to.
-
-So it is with nearly every provider. Dots stay: with most providers another dot is another person's mailbox.
-"""
+"""`addresses.mailbox_of` for the database, right for every address in its one spelling; see `OldAddress`."""
 
 
 class UserManager(BaseUserManager["User"]):
     def create_user(self, email: str, password: str | None = None, **fields: Any) -> "User":
         """Make an account; without a password it can only be entered by resetting one."""
-        user = self.model(email=self.normalize_email(email).lower(), **fields)
+        user = self.model(email=spelled(email), **fields)
         user.set_password(password)
         user.save(using=self._db)
         return user
 
     def create_superuser(self, email: str, password: str | None = None, **fields: Any) -> "User":
+        """Make an account of a maintainer. Raises `ValidationError`, as the command of Django expects."""
+        fault = fault_of(spelled(email))
+        if not fault and self.filter(email=spelled(email)).exists():
+            fault = "Another account has this address; expected an address of its own."
+        if fault:
+            raise ValidationError(fault)
         return self.create_user(email, password, is_staff=True, is_superuser=True, **fields)
 
 

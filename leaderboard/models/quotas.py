@@ -117,10 +117,11 @@ class QuotaOverride(QuotaRules):
 
 
 class SpentMailbox(models.Model):
-    """The mailbox of a deleted account, as a keyed hash; see `quotas.mailboxes`."""
+    """A mailbox that an account had when it sent files, as a keyed hash; see `quotas.mailboxes`."""
 
     account = models.ForeignKey(User, on_delete=models.CASCADE, related_name="+")
     digest = models.CharField(max_length=64, db_index=True)
+    sent_until = models.DateTimeField(help_text="What the account sent later does not count for the mailbox.")
     kept_until = models.DateTimeField(db_index=True)
 
     class Meta:
@@ -129,7 +130,20 @@ class SpentMailbox(models.Model):
         ]
 
     def __str__(self) -> str:
-        return f"a mailbox of the deleted account {self.account_id}"
+        return f"a mailbox of the account {self.account_id}"
+
+
+class OldAddress(models.Model):
+    """An address that cannot have its one spelling, because another account has that, and its mailbox.
+
+    Such addresses are from before `addresses.spelled`. Both accounts sign in as ever, and share a quota.
+    """
+
+    address = models.CharField(max_length=254, unique=True)
+    mailbox = models.CharField(max_length=254, db_index=True)
+
+    def __str__(self) -> str:
+        return self.address
 
 
 class Admission(models.Model):

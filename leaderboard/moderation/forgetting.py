@@ -19,6 +19,7 @@ from leaderboard.models import (
     Mail,
     Membership,
     Method,
+    OldAddress,
     Submission,
     Team,
     User,
@@ -162,6 +163,7 @@ def _delete_rows(user: User, *, known: list[str]) -> None:
     Invitation.objects.filter(created_by=user).delete()
     user.changes.all().delete()
     Mail.objects.filter(Q(user=user) | Q(recipient__in=known)).delete()
+    OldAddress.objects.filter(address__in=known).delete()
     EmailAddress.objects.filter(user=user).delete()
     Authenticator.objects.filter(user=user).delete()
     SocialAccount.objects.filter(user=user).delete()

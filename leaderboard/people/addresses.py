@@ -1,15 +1,49 @@
-"""Email addresses. An account that was never confirmed gives way to the next sign-up."""
+"""Email addresses, in one spelling each. An account without a proved one gives way to the next sign-up."""
 
 from datetime import datetime, timedelta
 
 from allauth.account.models import EmailAddress
 from django.conf import settings
+from django.core.exceptions import ValidationError
+from django.core.validators import validate_email
 from django.db import transaction
 from django.db.models import Exists, OuterRef, Q, QuerySet
 
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import User
+from leaderboard.models.addresses import fault_of, spelled
 
 UNCONFIRMED_FOR = timedelta(days=1)
+
+
+def accepted(text: str) -> str:
+    """Return the one spelling of an address that an account may have from now on. Raises `Refused`."""
+    address = spelled(text)
+    try:
+        validate_email(address)
+    except ValidationError:
+        fault = "That is no email address; expected one such as ada@example.org."
+    else:
+        fault = ""
+    fault = fault_of(address) or fault
+    if fault:
+        raise Refused("bad-value", fault, field="email")
+    return address
+
+
+def stored(text: str) -> str:
+    """Return the spelling under which an account has this address, for who signs in or resets a password."""
+    # Only an account from before addresses had one spelling has another one.
+    typed = text.strip().lower()
+    is_old = User.objects.filter(email=typed).exists() or _rows_of(typed).exists()
+    return typed if is_old else spelled(text)
+
+
+def owners_of(address: str) -> QuerySet[User]:
+    """Return the accounts that may reset their password by a mail to this address."""
+    accounts = accounts_of(address).filter(is_active=True)
+    proved = accounts.filter(Exists(_rows().filter(email=address, verified=True)))
+    return proved if proved.exists() else accounts
 
 
 def accounts_of(address: str) -> QuerySet[User]:
@@ -54,6 +88,10 @@ def are_proved() -> bool:
 
 def _rows() -> QuerySet[EmailAddress]:
     return EmailAddress.objects.filter(user=OuterRef("pk"))
+
+
+def _rows_of(address: str) -> QuerySet[EmailAddress]:
+    return EmailAddress.objects.filter(email=address)
 
 
 def _is_unconfirmed() -> Q:

@@ -3,7 +3,7 @@
 Use follows from the submissions: one costs a slot while it waits or runs, and for good once it is scored.
 Rejected and cancelled files, and those that crashed their reader, have a limit of their own; a limit of bytes
 a day covers all. Quota follows people: a team has used what its methods got, and what its present members
-have sent anywhere. Accounts of one mailbox are one person's, deleted ones included (`mailboxes`).
+have sent anywhere. Accounts with a mailbox in common are one person's, former ones included (`mailboxes`).
 """
 
 import math
@@ -13,14 +13,14 @@ from datetime import datetime, timedelta
 
 from django.conf import settings
 from django.db import transaction
-from django.db.models import BooleanField, Exists, ExpressionWrapper, OuterRef, Q, QuerySet
+from django.db.models import BooleanField, Exists, ExpressionWrapper, OuterRef, Q
 
 from evaluator.counting import counted
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Evaluation, Membership, QuotaOverride, Split, Status, Submission, Team, User
 from leaderboard.models.quotas import QuotaRules, excess
-from leaderboard.people import accounts, addresses
+from leaderboard.people import accounts
 from leaderboard.quotas import mailboxes
 from leaderboard.quotas.spans import span
 
@@ -95,15 +95,21 @@ def state(*, team: Team | None, user: User, split: Split, now: datetime) -> Quot
 def lock(*, team: Team) -> bool:
     """Lock the team's quota until this transaction ends. Returns whether the team still exists."""
     # The teams of other accounts of its people spend the same quota.
-    others = Membership.objects.filter(user__mailbox__in=team.members.values("mailbox")).values("team")
+    people = mailboxes.mates(team.members.all()).accounts
+    others = Membership.objects.filter(user__in=people).values("team")
     rows = Team.objects.select_for_update(no_key=True).filter(Q(pk=team.pk) | Q(pk__in=others))
     return team.pk in {row.pk for row in rows.order_by("pk")}
 
 
 def lock_accounts(*, user: User) -> None:
-    """Lock the accounts of this mailbox: two of them cannot take one slot. Raises `Refused` if closed."""
-    same = Q(pk=user.pk) | Q(mailbox__in=User.objects.filter(pk=user.pk).values("mailbox"))
-    rows = User.objects.select_for_update(no_key=True).filter(same).order_by("pk")
+    """Lock the accounts that count with this one, so that two of them cannot take one slot.
+
+    Raises `Refused` if this one is closed.
+    """
+    mates = mailboxes.mates(User.objects.filter(pk=user.pk))
+    former = [row.account_id for row in mates.spent]
+    together = Q(pk=user.pk) | Q(pk__in=mates.accounts.values("pk")) | Q(pk__in=former)
+    rows = User.objects.select_for_update(no_key=True).filter(together).order_by("pk")
     accounts.require_open({row.pk: row for row in rows}[user.pk])
 
 
@@ -161,18 +167,9 @@ def _spent(
 
 def _theirs(team: Team | None, user: User) -> Q:
     """Match what anybody sent for the team, and what its people sent anywhere."""
-    theirs = Q(submitted_by__in=_accounts(team, user).values("pk"))
-    return theirs if team is None else theirs | Q(method__team=team)
-
-
-def _accounts(team: Team | None, user: User) -> QuerySet[User]:
-    # Where addresses are not proved, anybody could spend somebody else's quota under an address like theirs.
     people = User.objects.filter(membership__team=team) if team else User.objects.filter(pk=user.pk)
-    if not addresses.are_proved():
-        return people
-    same = Q(mailbox__in=people.values("mailbox"))
-    deleted = mailboxes.deleted_accounts(people)
-    return User.objects.filter(same | Q(pk__in=deleted) if deleted else same)
+    theirs = mailboxes.mates(people).sent()
+    return theirs if team is None else theirs | Q(method__team=team)
 
 
 def _with_bytes(quota: Quota, *, team: Team | None, user: User, size_bytes: int, now: datetime) -> Quota:

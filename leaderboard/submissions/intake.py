@@ -20,7 +20,7 @@ from leaderboard.models import Edition, Method, SentFile, Split, Submission, Tea
 from leaderboard.people import teams
 from leaderboard.people.names import clean_name
 from leaderboard.queue import lifecycle
-from leaderboard.quotas import admissions, usage
+from leaderboard.quotas import admissions, mailboxes, usage
 from leaderboard.storage import files, orphans
 
 log = structlog.get_logger(__name__)
@@ -155,6 +155,7 @@ def _record(request: SubmissionRequest, file: files.StoredFile, *, split: Split)
         note=request.note,
         commit=request.commit,
     )
+    mailboxes.keep(user=request.user, now=request.now)
     _queue(submission, split=split)
     if changes:
         submission.method = editing.edit(method=method, changes=changes, actor=request.user)

@@ -3,16 +3,13 @@
 from argparse import ArgumentParser
 from typing import Any
 
-from django.core.exceptions import ValidationError
-from django.core.management.base import CommandError
-from django.core.validators import validate_email
 from django.db import transaction
 from django.utils import timezone
 
 from evaluator.counting import counted
 from leaderboard.management.arguments import RefusingCommand
 from leaderboard.models import Scope, User
-from leaderboard.people import tokens
+from leaderboard.people import addresses, tokens
 
 
 class Command(RefusingCommand):
@@ -36,14 +33,9 @@ class Command(RefusingCommand):
         )
 
     def handle(self, *args: Any, **options: Any) -> None:
-        email = options["email"].strip().lower()
-        try:
-            validate_email(email)
-        except ValidationError as fault:
-            raise CommandError(f"{email!r} is not an email address.") from fault
         with transaction.atomic():
             secret = tokens.create(
-                user=self._account(email),
+                user=self._account(options["email"]),
                 name=options["name"],
                 scopes=options["scope"] or tokens.USUAL_SCOPES,
                 split_name=options["split"],
@@ -55,9 +47,10 @@ class Command(RefusingCommand):
             f"The token is shown only once. It expires after {counted(options['days'], 'day')}."
         )
 
-    def _account(self, email: str) -> User:
-        user = User.objects.filter(email=email).first()
+    def _account(self, text: str) -> User:
+        user = User.objects.filter(email=addresses.stored(text)).first()
         if user is None:
+            email = addresses.accepted(text)
             user = User.objects.create_user(email)
             self.stderr.write(
                 f"No account had {email}; made one. Its password can be set by 'password reset'."

@@ -23,16 +23,20 @@ from django.contrib.auth.hashers import make_password
 from django.contrib.auth.models import AnonymousUser
 from django.contrib.sites.requests import RequestSite
 from django.core.cache import cache
+from django.core.exceptions import ValidationError
 from django.core.mail import EmailMessage
 from django.db import transaction
 from django.http import HttpRequest
 from django.urls import reverse
 from django.utils import timezone
 
+from leaderboard.errors.refusals import Refused
 from leaderboard.mails import outbox
 from leaderboard.models import MailKind, User
+from leaderboard.models.addresses import mailbox_of
 from leaderboard.moderation import takeovers
 from leaderboard.people import addresses, second_factor
+from leaderboard.quotas import mailboxes
 from leaderboard.web.account import identity
 
 KNOWN_ADDRESS_S = 90 * 24 * 3600
@@ -59,7 +63,15 @@ class AccountAdapter(DefaultAccountAdapter):
         "too_many_codes": "Too many wrong codes. Try again in 5 minutes.",
         "too_many_codes_today": "Too many wrong codes. Try again tomorrow.",
         "too_many_logins_anywhere": "Too many failed sign-ins. Try again in an hour, or reset the password.",
+        "too_many_mails": "We sent several mails to this mailbox within a minute. Try again in a minute.",
     }
+
+    def clean_email(self, email: str) -> str:
+        """Return the one spelling of an address for a new account, or one more of an account."""
+        try:
+            return addresses.accepted(email)
+        except Refused as refused:
+            raise ValidationError(str(refused), code="invalid") from refused
 
     def send_mail(self, template_prefix: str, email: str, context: dict[str, Any]) -> None:
         """Send a mail with links to the configured site, now or later."""
@@ -81,6 +93,8 @@ class AccountAdapter(DefaultAccountAdapter):
 
     def pre_authenticate(self, request: HttpRequest, **credentials: Any) -> None:
         """Count one try. Raises allauth's validation error after too many, and after fewer wrong ones."""
+        # Other spellings of an address give no further tries.
+        credentials = _spelled(credentials)
         self._count_wrong(request, **credentials)
         key = self._get_login_attempts_cache_key(request, **credentials)
         # A right password costs as much of the processor as a wrong one.
@@ -101,6 +115,7 @@ class AccountAdapter(DefaultAccountAdapter):
         self._login_failed_rl_usage.usage.extend(usage.usage)
 
     def authenticate(self, request: HttpRequest, **credentials: Any) -> Any:
+        credentials = _spelled(credentials)
         user = super().authenticate(request, **credentials)
         if user and addresses.is_unconfirmed(user):
             # Whoever made it needs to show that the address is theirs, and is told what a wrong password is
@@ -126,6 +141,8 @@ class AccountAdapter(DefaultAccountAdapter):
             user = User.objects.select_for_update(no_key=True).filter(pk=email_address.user_id).first()
             before = takeovers.proved(user) if user else []
             is_confirmed = user is not None and bool(super().confirm_email(request, email_address))
+            if user and is_confirmed:
+                mailboxes.keep(user=user, now=timezone.now())
         if user and is_confirmed and before:
             self._tell("account/email/email_added", user, before, {"added_email": email_address.email})
         return is_confirmed
@@ -192,6 +209,12 @@ class OwnersAddress(forms.BaseSignupForm):
             return str(super().validate_unique_email(value))
         return value
 
+    def clean(self) -> dict[str, Any]:
+        cleaned: dict[str, Any] = super().clean()
+        if not self.errors:
+            _count_mail(cleaned["email"])
+        return cleaned
+
     def save(self, request: HttpRequest) -> User:
         with transaction.atomic():
             addresses.release(address=self.cleaned_data["email"])
@@ -233,11 +256,11 @@ class ConfirmAddressForm(forms.ConfirmEmailVerificationCodeForm):
 
 
 class ResetPasswordForm(forms.ResetPasswordForm):
-    def clean_email(self) -> Any:
+    def clean_email(self) -> str:
         # An unconfirmed account gets no mail: its maker may have another way in.
-        address = super().clean_email()
-        theirs = set(addresses.accounts_of(address))
-        self.users = [user for user in self.users if user in theirs]  # type: ignore[has-type]  # allauth sets it here alone
+        address = addresses.stored(self.cleaned_data["email"])
+        _count_mail(address)
+        self.users = list(addresses.owners_of(address))
         return address
 
 
@@ -257,6 +280,32 @@ def _remind(user: User) -> None:
     key = f"unconfirmed:{user.pk}:{now:%Y%m%d%H}"
     mail = outbox.notice(kind=MailKind.ACCOUNT, user=user, key=key, subject=subject, text=text, now=now)
     outbox.queue([mail])
+
+
+class AddAddressForm(forms.AddEmailForm):
+    def clean_email(self) -> Any:
+        address = super().clean_email()
+        _count_mail(address)
+        return address
+
+
+class SignInForm(forms.LoginForm):
+    def clean_login(self) -> str:
+        return addresses.stored(super().clean_login())
+
+
+def _count_mail(address: str) -> None:
+    """Count a mail that anybody can have sent to this mailbox. Raises `ValidationError` after too many."""
+    key = mailbox_of(address)
+    if not ratelimit.consume(allauth_context.request, app="allauth.account", action="mail", key=key):
+        raise get_adapter().validation_error("too_many_mails")
+
+
+def _spelled(credentials: dict[str, Any]) -> dict[str, Any]:
+    given = {
+        name: addresses.stored(value) for name in ("email", "username") if (value := credentials.get(name))
+    }
+    return {**credentials, **given}
 
 
 def _login_of(credentials: dict[str, Any]) -> str:

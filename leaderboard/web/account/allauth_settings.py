@@ -17,7 +17,9 @@ SETTINGS: Final[dict[str, Any]] = {
     "ACCOUNT_SIGNUP_REDIRECT_URL": "/submit/",
     "ACCOUNT_ADAPTER": f"{_HERE}.accounts.AccountAdapter",
     "ACCOUNT_FORMS": {
+        "login": f"{_HERE}.accounts.SignInForm",
         "signup": f"{_HERE}.accounts.SignupForm",
+        "add_email": f"{_HERE}.accounts.AddAddressForm",
         "confirm_email_verification_code": f"{_HERE}.accounts.ConfirmAddressForm",
         "reset_password": f"{_HERE}.accounts.ResetPasswordForm",
         "reset_password_from_key": f"{_HERE}.password_forms.ResetPasswordKeyForm",
@@ -33,6 +35,8 @@ SETTINGS: Final[dict[str, Any]] = {
         "login_failed_anywhere": "30/h/key",
         "code_failed": "10/m/ip,5/5m/key,50/d/key",
         "code_failed_anywhere": "50/d/key",
+        # Mails that anybody can ask for; the key is the mailbox.
+        "mail": "5/m/key",
     },
     # A mail may take its time. Of codes that it names there are 2.6e10; each is good for three tries.
     "ACCOUNT_EMAIL_VERIFICATION_BY_CODE_TIMEOUT": 3600,

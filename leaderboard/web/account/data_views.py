@@ -32,7 +32,7 @@ class DeleteForm(SiteForm):
     )
 
     def require(self, user: User) -> None:
-        if self.cleaned_data["email"].strip().lower() != user.email:
+        if addresses.stored(self.cleaned_data["email"]) != user.email:
             raise Refused(
                 "bad-value", "That is another address; expected the address of this account.", field="email"
             )

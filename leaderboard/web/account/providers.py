@@ -31,6 +31,7 @@ from django.http import HttpRequest
 from django.shortcuts import render
 from django.urls import URLPattern, URLResolver, include, path
 
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import User
 from leaderboard.people import addresses
 from leaderboard.web.account.accounts import OwnersAddress
@@ -99,24 +100,28 @@ class OrcidViews(_ProviderViews, OrcidOAuth2Adapter):
         person = login.account.extra_data.get("person") or {}
         rows = (person.get("emails") or {}).get("email") or []
         rows = [row for row in rows if row.get("verified") is True and row.get("email")]
-        return _sorted(_address(row["email"], is_primary=row.get("primary") is True) for row in rows)
+        return _sorted((row["email"], row.get("primary") is True) for row in rows)
 
 
 class GitHubViews(_ProviderViews, GitHubOAuth2Adapter):
     def verified(self, login: SocialLogin) -> list[EmailAddress]:
         rows = [row for row in login.email_addresses if row.verified is True]
-        return _sorted(_address(row.email, is_primary=row.primary is True) for row in rows)
+        return _sorted((row.email, row.primary is True) for row in rows)
 
     def kept(self, profile: Mapping[str, Any]) -> dict[str, str]:
         return {"login": str(profile.get("login", ""))[:100]}
 
 
-def _address(text: str, *, is_primary: bool) -> EmailAddress:
-    return EmailAddress(email=text.lower(), verified=True, primary=is_primary)
-
-
-def _sorted(addresses: Iterator[EmailAddress]) -> list[EmailAddress]:
-    return sorted(addresses, key=lambda address: (not address.primary, address.email))
+def _sorted(verified: Iterator[tuple[str, bool]]) -> list[EmailAddress]:
+    """Return the addresses that an account may have, the primary ones first."""
+    rows = []
+    for text, is_primary in verified:
+        try:
+            address = addresses.accepted(text)
+        except Refused:
+            continue
+        rows.append(EmailAddress(email=address, verified=True, primary=is_primary))
+    return sorted(rows, key=lambda row: (not row.primary, row.email))
 
 
 class ProviderAdapter(DefaultSocialAccountAdapter):
@@ -176,9 +181,9 @@ class ProviderSignupForm(OwnersAddress, SignupForm):
     """Address and name; an address that the provider verified counts as proved."""
 
     def save(self, request: HttpRequest) -> User:
-        typed = self.cleaned_data["email"].lower()
-        addresses = self.sociallogin.email_addresses
-        self.sociallogin.email_addresses = [each for each in addresses if each.email == typed]
+        typed = self.cleaned_data["email"]
+        verified = self.sociallogin.email_addresses
+        self.sociallogin.email_addresses = [each for each in verified if each.email == typed]
         user: User = super().save(request)
         return user
 

@@ -5,11 +5,14 @@ from django.core.paginator import Paginator
 from django.db.models import Count, Max, Prefetch, Q, QuerySet
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import render
+from django.utils import timezone
 from django.views.decorators.http import require_safe
 
-from leaderboard.models import Team, User
+from leaderboard.models import OldAddress, Team, User
 from leaderboard.moderation import forgetting
 from leaderboard.people import names
+from leaderboard.quotas import mailboxes
+from leaderboard.quotas.spans import span
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_views import maintainers_only
 
@@ -30,6 +33,10 @@ def team_list(request: HttpRequest) -> HttpResponse:
     alone = User.objects.filter(email__icontains=text, membership=None).order_by("email")
     people = alone.exclude(email__endswith=f"@{forgetting.NOWHERE}")[:PER_PAGE]
     context = {"form": form, "text": text, "page": page, "people": people}
+    if not text and page.number == 1:
+        context["domains"] = mailboxes.busiest_domains(now=timezone.now())
+        context["window"] = span(mailboxes.longest_window())
+        context["old_addresses"] = OldAddress.objects.order_by("mailbox", "address")
     return render(request, "maintain/teams.html", context, status=400 if form.errors else 200)
 
 
