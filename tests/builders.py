@@ -1,6 +1,7 @@
 """Small worlds for tests: a made-up ground truth, prediction files for it, people and their submissions."""
 
 import random
+import zlib
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -27,14 +28,21 @@ from leaderboard.upkeep import backlog
 N_SEQUENCES = 120
 
 
-def truth_csv(path: Path, *, n: int = N_SEQUENCES, seed: int = 0, n_recordings: int = 24) -> Path:
-    """A ground truth with sequences in every interval and a few out of range."""
+def truth_csv(
+    path: Path, *, n: int = N_SEQUENCES, seed: int = 0, n_recordings: int = 24, shift_ns: int = 0
+) -> Path:
+    """A ground truth with sequences in every interval and a few out of range.
+
+    Another shift makes it one of other sequences.
+    """
     rng = np.random.default_rng(seed)
     tau = np.concatenate([[1.0, 4.0, 10.0, -10.0, 25.0], rng.uniform(0.3, 20, n - 5)])
     tau[5::4] *= -1
     rows = ["anno_id,bag_stamp,cam_id,ts,track_id,ttc"]
     for i, value in enumerate(tau):
-        rows.append(f"{i},{i % n_recordings:04d},1,{500_000_000 + i * 100_000_000},{i % 7},{value!r}")
+        rows.append(
+            f"{i},{i % n_recordings:04d},1,{500_000_000 + i * 100_000_000 + shift_ns},{i % 7},{value!r}"
+        )
     path.write_text("\n".join(rows).replace("np.float64(", "").replace(")", "") + "\n")
     return path
 
@@ -44,6 +52,8 @@ def import_truth(
 ) -> Edition:
     """Open a split with made-up ground truth, without the quotas that most tests are not about."""
     Split.objects.update(quota_limit=None, quota_min_gap=timedelta(0), quota_rejected_limit=None)
+    # Other splits have other sequences than the hidden one.
+    options.setdefault("shift_ns", 0 if split == "test" else 1 + zlib.crc32(split.encode()) % 10_000_000)
     path = truth_csv(tmp_path / f"truth-{split}.csv", **options)
     return ground_truth.import_truth(split_name=split, path=path, protocol=protocol, now=timezone.now())
 

@@ -20,7 +20,7 @@ from leaderboard.models import Edition, GroundTruth, Publication, Split, Submiss
 from leaderboard.models.submissions import SubmissionQuerySet
 from leaderboard.queue import lifecycle
 from leaderboard.statistics import disclosure
-from leaderboard.storage import files, manifests, truth_values
+from leaderboard.storage import files, hidden_marks, manifests, truth_values
 
 OPEN_PROTOCOL: Final = "tsttc-2"
 """The protocol of an open split's first edition, unless another one is named."""
@@ -65,13 +65,15 @@ def import_truth(
 def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> GroundTruth:
     """Validate a ground truth and keep it immutably. Returns the existing row for the same file.
 
-    Raises `evaluator.Rejected`, or `Refused` if the split is unknown or the ground truth is another split's.
+    Raises `evaluator.Rejected`, or `Refused` if the split is unknown, the ground truth is another split's, or
+    as `require_openable`.
     """
     split = Split.objects.select_related("current_edition__ground_truth").filter(name=split_name).first()
     if split is None:
         known = ", ".join(Split.objects.values_list("name", flat=True))
         raise Refused("unknown-split", f"There is no split {split_name!r}; expected one of {known}.")
     truth = evaluator.read_truth(path)
+    require_openable(split, truth)
     old = split.current_edition.ground_truth if split.current_edition else None
     counts = _compared(old, truth)
     n_in_ranges = {OVERALL: truth.n_sequences, **truth.counts_of(known_ranges().values())}
@@ -104,6 +106,31 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
         if is_new:
             audit.record_of(row, "imported", actor=actor)
     return row
+
+
+def require_openable(split: Split, truth: evaluator.GroundTruth) -> None:
+    """Raise `Refused` if the split is open, and the ground truth has sequences of a hidden one.
+
+    An open split shows errors of single sequences, from which anybody computes true values.
+    """
+    if split.is_hidden:
+        return
+    twin = truth_values.hidden_with(truth.manifest)
+    former = GroundTruth.objects.filter(split=split.truth_split_id).order_by("imported_at", "digest")
+    hidden = next((row for row in former if hidden_marks.is_marked(row.digest)), None)
+    if twin is not None:
+        digest, key = twin
+        why = f"the sequence {key} is in the hidden ground truth {digest.removeprefix('sha256:')[:8]} too"
+    elif hidden is not None:
+        why = f"the split's ground truth {hidden.short_digest} was imported as hidden"
+    else:
+        return
+    raise Refused(
+        "edition-refused",
+        f"The split {split.pk!r} is open, and {why}. An open split shows the errors of single sequences, "
+        "which would give the hidden values away; expected a ground truth without sequences of a hidden "
+        f"split. If the split {split.pk!r} was hidden before, somebody has changed the database.",
+    )
 
 
 def _require_own(split: Split, row: GroundTruth | None) -> None:

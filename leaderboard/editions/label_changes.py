@@ -9,6 +9,7 @@ import numpy as np
 
 import evaluator
 from evaluator.predictions.revisions import Comparison, compare, rows_in
+from leaderboard.editions import ground_truth
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, Split
 from leaderboard.storage import truth_values
@@ -39,6 +40,7 @@ def load(*, split_name: str, path: Path) -> LabelChanges:
             "edition-refused", f"The split {split_name!r} has no published edition to compare with."
         )
     new = evaluator.read_truth(path)
+    ground_truth.require_openable(split, new)
     old = truth_values.load(split.current_edition.ground_truth_id)
     return LabelChanges(split.current_edition, compare(old, new), _by_recording(old, new))
 

@@ -15,6 +15,12 @@ def is_marked(digest: str) -> bool:
     return path(digest).exists()
 
 
+def digests() -> tuple[str, ...]:
+    """Return the digests of all values that were imported as hidden, in order."""
+    marks = Path(settings.GROUND_TRUTH_DIR).glob("*.hidden")
+    return tuple(sorted(f"sha256:{mark.stem}" for mark in marks))
+
+
 def path(digest: str) -> Path:
     """Return the path of the mark, next to the values."""
     return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.hidden"

@@ -20,16 +20,45 @@ def manifest_path(digest: str) -> Path:
 
 
 def save(truth: evaluator.GroundTruth, *, is_hidden: bool) -> None:
-    """Write values and manifest, whole or not at all, private to the owner; mark hidden ones first."""
+    """Write values and manifest, whole or not at all, private to the owner; mark hidden ones first.
+
+    Values are hidden if their split is, and also if they share a sequence with hidden ones.
+    """
     directory = Path(settings.GROUND_TRUTH_DIR)
     directory.mkdir(parents=True, exist_ok=True, mode=0o700)
-    if is_hidden:
+    if is_hidden or hidden_with(truth.manifest) is not None:
         hidden_marks.put(truth.digest)
     for part, target in ((truth, values_path(truth.digest)), (truth.manifest, manifest_path(truth.digest))):
         if not target.exists():
             with files.replacing(target) as path:
                 part.save(path)
     seeds.ensure()
+
+
+def hidden_with(manifest: evaluator.Manifest) -> tuple[str, str] | None:
+    """Return the first hidden ground truth that has a sequence of this manifest, and the natural key of one.
+
+    It asks the private directory alone: the database does not decide what is hidden.
+    """
+    keys = frozenset(manifest.natural_keys)
+    for digest in hidden_marks.digests():
+        common = keys.intersection(_manifest_keys(digest))
+        if common:
+            return digest, min(common)
+    return None
+
+
+@lru_cache(maxsize=4)
+def _manifest_keys(digest: str) -> tuple[str, ...]:
+    # Without values and manifest nothing is left that could be hidden.
+    for path, kind in (
+        (manifest_path(digest), evaluator.Manifest),
+        (values_path(digest), evaluator.GroundTruth),
+    ):
+        if path.exists():
+            kept = kind.load(path)
+            return (kept if isinstance(kept, evaluator.Manifest) else kept.manifest).natural_keys
+    return ()
 
 
 def readable_digests() -> frozenset[str]:

@@ -90,7 +90,7 @@ def test_other_truth_for_an_open_split_is_refused(tmp_path: Path) -> None:
 
 
 def test_one_truth_belongs_to_one_split(tmp_path: Path) -> None:
-    builders.import_truth(tmp_path, split="val")
+    builders.import_truth(tmp_path, split="val", shift_ns=0)
     kept = sorted(settings.GROUND_TRUTH_DIR.iterdir())
     with pytest.raises(Refused, match="belongs to the split 'val' already"):
         builders.import_truth(tmp_path, split="test")
