@@ -23,5 +23,5 @@ def test_without_an_address_or_a_mail_server_the_command_fails(settings: Setting
     settings.ERROR_EMAILS = ["one@example.org"]
     settings.EMAIL_BACKEND = "django.core.mail.backends.smtp.EmailBackend"
     settings.EMAIL_HOST, settings.EMAIL_PORT = "127.0.0.1", 1
-    with pytest.raises(CommandError, match="nobody could be told: .*refused"):
+    with pytest.raises(CommandError, match=r"nobody could be told: .*refused"):
         call_command("report_failure", NAME)
