@@ -46,7 +46,7 @@ _FIRST: Final = frozenset(
     {
         *("revoked", "forgotten", "closed", "hidden", "withdrawn", "removed", "cleared", "shown", "deleted"),
         *("removed_member", "left", "handed_over", "appointed_owner", "revoked_invitation"),
-        *("admission_ended", "second factor reset"),
+        *("admission_ended", "second factor reset", "recovered", "given back"),
     }
 )
 """After these, somebody may again see or do what was taken from them."""

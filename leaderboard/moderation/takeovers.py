@@ -66,6 +66,13 @@ def note(*, user: User, what: str, before: Sequence[str], now: datetime) -> dict
     return {address: _link(change, address) for address in list(dict.fromkeys(former))[:MAX_RECIPIENTS]}
 
 
+def with_former_address(text: str) -> set[int]:
+    """Return the keys of the accounts that had an address with this text in it, as far as it is kept."""
+    part = text.strip().lower()
+    rows = AccountChange.objects.values_list("user", "before")
+    return {user for user, before in rows if part and any(part in address for address in before)}
+
+
 def delete_old(*, now: datetime) -> None:
     AccountChange.objects.filter(at__lte=now - KEPT).delete()
 

@@ -9,7 +9,7 @@ from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from leaderboard.models import OldAddress, Team, User
-from leaderboard.moderation import forgetting
+from leaderboard.moderation import forgetting, takeovers
 from leaderboard.people import names
 from leaderboard.quotas import mailboxes
 from leaderboard.quotas.spans import span
@@ -30,7 +30,8 @@ def team_list(request: HttpRequest) -> HttpResponse:
     form = TeamSearch(request.GET)
     text = form.cleaned_data["team"] if form.is_valid() else ""
     page = Paginator(_teams(text), PER_PAGE).get_page(request.GET.get("page"))
-    alone = User.objects.filter(email__icontains=text, membership=None).order_by("email")
+    matches = Q(email__icontains=text) | Q(pk__in=takeovers.with_former_address(text))
+    alone = User.objects.filter(matches, membership=None).order_by("email")
     people = alone.exclude(email__endswith=f"@{forgetting.NOWHERE}")[:PER_PAGE]
     context = {"form": form, "text": text, "page": page, "people": people}
     if not text and page.number == 1:
@@ -41,10 +42,9 @@ def team_list(request: HttpRequest) -> HttpResponse:
 
 
 def _teams(text: str) -> QuerySet[Team]:
-    """Return teams with this text in their name or in a member's address."""
-    fits = Q(name__icontains=text) | Q(
-        pk__in=Team.objects.filter(members__email__icontains=text).values("pk")
-    )
+    """Return teams with this text in their name or in a present or former address of a member."""
+    has_address = Q(members__email__icontains=text) | Q(members__in=takeovers.with_former_address(text))
+    fits = Q(name__icontains=text) | Q(pk__in=Team.objects.filter(has_address).values("pk"))
     if look := names.skeleton(text):
         fits |= Q(look__contains=look)
     rows = Team.objects.filter(fits) if text else Team.objects.all()

@@ -16,7 +16,7 @@ from pytest_django import Settings
 from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.models import AccountChange, ApiToken, AuditEvent, Mail, User
 from leaderboard.moderation import forgetting, takeovers
-from leaderboard.people import addresses
+from leaderboard.people import addresses, teams
 from tests import builders
 from tests.leaderboard.web.account.proving import CONFIRM, code_in, confirm, proving, sign_up
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -290,6 +290,22 @@ def test_a_maintainer_gives_an_account_back_and_confirms_who_they_are(victim: Us
     assert recipients == {"owner@example.org", EVIL}
     every_link = [*links_to("owner@example.org"), *links_to("second@example.org"), *links_to(EVIL)]
     assert [follow(link) for link in every_link] == [410] * len(every_link)
+
+
+@pytest.mark.parametrize("has_team", [True, False])
+def test_a_maintainer_finds_the_account_by_the_address_that_it_had(
+    victim: User, maintainer: User, has_team: bool
+) -> None:
+    if has_team:
+        teams.create(user=victim, name="Owls", now=timezone.now())
+    client = thief(victim)
+    add(client)
+    make_primary(client)
+    remove(client, "owner@example.org")
+    keeper = Client()
+    keeper.force_login(maintainer)
+    assert EVIL in keeper.get("/maintain/teams/?team=Owner@example.org").text
+    assert EVIL not in keeper.get("/maintain/teams/?team=nobody@example.org").text
 
 
 def test_only_maintainers_give_accounts_back_and_not_those_of_maintainers(
