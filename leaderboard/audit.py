@@ -110,10 +110,11 @@ def _seal_some() -> int:
         events = list(AuditEvent.objects.filter(hash=None).order_by("pk")[:_CHUNK])
         for event in events:
             number += 1
-            event.seal_number, event.previous_hash = number, tip
-            event.hash = tip = event.hash_after(tip)
-        # Not by the model's own queryset, which refuses every change.
-        QuerySet[AuditEvent](AuditEvent).bulk_update(events, ["seal_number", "previous_hash", "hash"])
+            seal = {"seal_number": number, "previous_hash": tip, "hash": event.hash_after(tip)}
+            # Not by the model's own queryset, which refuses every change. One after the other: the database
+            # compares each seal with the one before.
+            QuerySet[AuditEvent](AuditEvent).filter(pk=event.pk).update(**seal)
+            tip = str(seal["hash"])
     return len(events)
 
 

@@ -78,8 +78,13 @@ def sweep(*, rng: random.Random) -> None:
     n_out_of_reach = due.count() - due.scorable(truth_values.readable_digests()).count()
     if n_out_of_reach:
         log.error("ground_truth_out_of_reach", n_waiting=n_out_of_reach)
-    audit.seal()
     health.record_sweep(n_out_of_reach=n_out_of_reach)
+    # Last, and on its own: an event that cannot be sealed keeps nothing else from being done. Health and
+    # metrics tell how long the oldest one waits.
+    try:
+        audit.seal()
+    except Exception:
+        log.exception("audit_not_sealed")
 
 
 def clean(*, now: datetime) -> None:

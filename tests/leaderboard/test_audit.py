@@ -1,6 +1,7 @@
 """The audit log: append-only, and sealed into a chain that shows what was done to it."""
 
 import random
+import threading
 from datetime import timedelta
 from io import StringIO
 from typing import Any
@@ -11,7 +12,7 @@ from django.db import IntegrityError, connection, transaction
 from django.utils import timezone
 
 from leaderboard import audit
-from leaderboard.models import AuditEvent, Edition, Evaluation, User
+from leaderboard.models import AuditEvent, Edition, Evaluation, SweepBeat, User
 from leaderboard.models.audit import GENESIS, AppendOnly
 from leaderboard.upkeep import pollers
 from tests import builders
@@ -20,6 +21,9 @@ SQLITE_ONLY = pytest.mark.skipif("connection.vendor != 'sqlite'", reason="there 
 POSTGRESQL_ONLY = pytest.mark.skipif(
     "connection.vendor != 'postgresql'", reason="only PostgreSQL refuses what is asked for in SQL"
 )
+
+WHOLE = "seal_number = 1, previous_hash = repeat('0', 64), hash = repeat('a', 64)"
+"""The seal of the first event, in SQL; that the hash is another one shows `verify`."""
 
 
 def record(n: int = 1, **fields: Any) -> AuditEvent:
@@ -165,17 +169,76 @@ def test_postgresql_refuses_to_change_and_to_delete(db: None, change: str, is_se
     "seal",
     [
         "hash = 'a'",
-        "seal_number = 1, hash = 'a'",
-        "seal_number = 1, previous_hash = 'b', hash = 'a', noun_id = 'other'",
-        "seal_number = 1, previous_hash = 'b', hash = 'a', at = now()",
-        "seal_number = 1, previous_hash = 'b', hash = 'a', details = '{}'",
+        "seal_number = 1, hash = repeat('a', 64)",
+        f"{WHOLE}, noun_id = 'other'",
+        f"{WHOLE}, at = now()",
+        f"{WHOLE}, details = '{{}}'",
+        # Another place in the chain than the next one, and a hash that is none.
+        WHOLE.replace("= 1", "= 9223372036854775807"),
+        WHOLE.replace("= 1", "= 0"),
+        WHOLE.replace("= 1", "= 2"),
+        WHOLE.replace("repeat('0', 64)", "repeat('b', 64)"),
+        WHOLE.replace("repeat('a', 64)", "'a'"),
+        WHOLE.replace("repeat('a', 64)", "repeat('A', 64)"),
     ],
 )
 def test_postgresql_allows_a_whole_seal_and_nothing_beside_it(db: None, seal: str) -> None:
     record()
     with pytest.raises(IntegrityError, match="append-only"), transaction.atomic():
         in_sql(f"UPDATE leaderboard_auditevent SET {seal}")
-    in_sql("UPDATE leaderboard_auditevent SET seal_number = 1, previous_hash = 'b', hash = 'a'")
+    in_sql(f"UPDATE leaderboard_auditevent SET {WHOLE}")
+    record()
+    assert audit.seal() == 1
+
+
+@POSTGRESQL_ONLY
+def test_an_event_of_somebody_else_breaks_neither_the_chain_nor_the_sealing(db: None) -> None:
+    sealed(2)
+    columns = "(at, verb, noun, noun_id, details"
+    event = "('1999-01-01', 'v', 'n', '1'"
+    refused = [
+        f"{columns}, seal_number, previous_hash) VALUES {event}, '{{}}', 9223372036854775807, 'b')",
+        f"{columns}, seal_number) VALUES {event}, '{{}}', 3)",
+        f"{columns}, hash) VALUES {event}, '{{}}', repeat('c', 64))",
+        f"{columns}) VALUES {event}, ('{{\"n\": 1' || repeat('0', 5000) || '}}')::jsonb)",
+        f"{columns}) VALUES {event}, '{{\"n\": [1e400]}}')",
+        f"{columns}) VALUES {event}, '{{\"n\": -1e301}}')",
+        f"{columns}) VALUES {event}, (repeat('[', 2000) || repeat(']', 2000))::jsonb)",
+        f"{columns}) VALUES {event}, jsonb_build_object('x', repeat('x', 1000001)))",
+        f"{columns}) VALUES {event}, '[]')",
+        f"{columns}) VALUES {event}, 'null')",
+    ]
+    for values in refused:
+        with pytest.raises(IntegrityError, match="audit events"), transaction.atomic():
+            in_sql(f"INSERT INTO leaderboard_auditevent {values}")
+    accepted = ['\'{"n": 9223372036854775807, "x": [0.5, {"y": ["z"]}]}\'', "'{\"a\": null}'", "'{}'"]
+    for details in accepted:
+        in_sql(
+            f"INSERT INTO leaderboard_auditevent {columns}, id) VALUES {event}, {details}, {-len(details)})"
+        )
+    record(2)
+    assert audit.seal() == len(accepted) + 2
+    verification = audit.verify()
+    assert (verification.n_events, verification.breaks) == (len(accepted) + 4, ())
+    # The database says when they were written.
+    assert AuditEvent.objects.filter(at__year=1999).count() == 0
+
+
+def test_an_event_that_cannot_be_sealed_keeps_nothing_else_from_being_done(
+    db: None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail() -> int:
+        raise ValueError("no seal")
+
+    monkeypatch.setattr(audit, "seal", fail)
+    record()
+    SweepBeat.objects.get_or_create(pk=SweepBeat.THE_ONE)
+    pollers.keep_up(rng=random.Random(0), stopping=threading.Event())
+    beat = SweepBeat.objects.get()
+    assert beat.swept_at is not None
+    assert beat.cleaned_at is not None
+    assert "audit_not_sealed" in caplog.text
+    assert AuditEvent.objects.unsealed().n_events == 1
 
 
 @POSTGRESQL_ONLY

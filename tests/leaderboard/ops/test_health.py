@@ -4,10 +4,10 @@ import random
 import re
 import socket
 from collections.abc import Iterator
-from datetime import timedelta
+from datetime import datetime, timedelta
 
 import pytest
-from django.db import connections
+from django.db import connection, connections
 from django.db.models.functions import Now
 from django.test import Client
 from django.utils import timezone
@@ -78,7 +78,7 @@ def test_no_sweep_for_a_minute_is_not_ready(seconds_ago: float | None, is_ok: bo
 def test_events_that_nobody_seals_are_shown_and_keep_the_site_ready(seconds_ago: float, is_ok: bool) -> None:
     _swept(seconds_ago=1)
     at = timezone.now() - timedelta(seconds=seconds_ago)
-    AuditEvent.objects.create(at=at, verb="opened", noun="Door", noun_id="1")
+    _written(at)
     response = Client().get("/healthy")
     assert (response.status_code, response.json()["checks"]["audit log"]["ok"]) == (200, is_ok)
     figures = prometheus.exposition().decode()
@@ -130,3 +130,14 @@ def test_database_that_accepts_but_never_answers_is_given_up(
     assert "swordfish" not in response.text
     with pytest.raises(ConnectionDoesNotExist):
         connections[health.PROBE]
+
+
+def _written(at: datetime) -> None:
+    """An audit event of that time, whatever the database says of the time."""
+    is_postgresql = connection.vendor == "postgresql"
+    with connection.cursor() as cursor:
+        if is_postgresql:
+            cursor.execute("ALTER TABLE leaderboard_auditevent DISABLE TRIGGER audit_new_event")
+        AuditEvent.objects.create(at=at, verb="opened", noun="Door", noun_id="1")
+        if is_postgresql:
+            cursor.execute("ALTER TABLE leaderboard_auditevent ENABLE TRIGGER audit_new_event")
