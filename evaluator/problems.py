@@ -97,9 +97,16 @@ class FileWarning:
 WARNING_CODES: Final[dict[str, str]] = {
     "not-seconds": "Nearly all values lie beyond ±20 s: probably milliseconds.",
     "looks-like-ratios": "Nearly all values lie between 0.5 and 1.5: probably scale ratios without a unit.",
+    "within-one-second": "Nearly all values lie within ±1: probably inverse times or probabilities.",
+    "constant-values": "Half of the values or more are the same: probably a default value.",
+    "infinite-values": "A quarter of the values or more are infinite: probably an overflow.",
+    "inverse-times": "Values change as inverse times do: probably 1/τ, or logarithms of scale ratios.",
+    "wrong-rate": "Values are a fixed factor too large or too small: probably a wrong rate, or areas.",
     "flipped-signs": "Values of one object rise while time passes: probably every sign is wrong.",
     "shuffled-values": "The predictions seem to be in another order than the sequences: probably wrong keys.",
     "unlike-truth": "The predictions do not match the true times, or have the opposite sign.",
+    "unlike-recordings": "In some recordings the predictions do not match the true times: probably old keys.",
+    "shifted-times": "All times are about half a second off: probably counted from another frame.",
     "other-numbering": "The toolkit numbers the sequences of a folder differently on this machine.",
 }
 """The meaning of every warning, by its code."""

@@ -226,6 +226,8 @@ if not 0 < HEARTBEAT_S < LEASE_S < WALL_S:
         "expected each to be shorter than the next."
     )
 SWEEP_S = env.float("TSTTC_SWEEP_S", default=15.0)
+# Two nights without a good backup; 0: nobody is told.
+MAX_BACKUP_AGE_H = env.float("TSTTC_MAX_BACKUP_AGE_H", default=50.0)
 # Without a broker nobody tells the workers, and somebody waits.
 POLL_S = env.float("TSTTC_POLL_S", default=5.0 if PRODUCTION else 0.5)
 # How often stored files that no submission names are removed (see leaderboard/upkeep/pollers.py).

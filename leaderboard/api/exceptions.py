@@ -65,11 +65,11 @@ def exception_handler(exc: Exception, context: dict[str, Any]) -> Response | Non
         throttle = UnauthorizedThrottle()
         if not throttle.allow_request(context["request"], context["view"]):
             exc = exceptions.Throttled(throttle.wait())
-    return _outage(exc) or _domain_error(exc) or _bad_request(exc) or _framework_error(exc, context)
+    return _outage(exc, context) or _domain_error(exc) or _bad_request(exc) or _framework_error(exc, context)
 
 
-def _outage(exc: Exception) -> Response | None:
-    outage = outages.answered(exc)
+def _outage(exc: Exception, context: dict[str, Any]) -> Response | None:
+    outage = outages.answered(exc, marks=context["request"].META)
     if outage is None:
         return None
     return problem(status=outage.status, code=outage.code, detail=outage.sentence, headers=outage.headers)

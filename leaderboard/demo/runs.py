@@ -106,9 +106,10 @@ def make(folder: Path, *, names: Sequence[str]) -> None:
     runs = [get_run(name) for name in names or [run.name for run in RUNS]]
     for command in (FRAMES, *(run.command for run in runs)):
         subprocess.run(shlex.split(command), cwd=folder, check=True)  # noqa: S603 - our own commands
+    manifest = evaluator.read_manifest(folder / "frames" / "manifest.csv")
     for run in runs:
         values = json.loads((folder / f"{run.name}.json").read_text())["predictions"]
-        run.keep(np.array([values[key] for key in sorted(values, key=int)]))
+        run.keep(np.array([values[key] for key in manifest.natural_keys])[manifest.rows_by_id])
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import errno
 from dataclasses import dataclass
+from typing import Any, Final
 
 import structlog
 from django.db import InterfaceError, OperationalError
@@ -11,6 +12,8 @@ from leaderboard.storage.files import FULL, StoreUnavailable
 
 log = structlog.get_logger(__name__)
 
+MARK: Final = "tsttc.outage"
+"""Where a request's `META` has the code of the outage that answered it."""
 # What a disk says that is read-only, broken, or of another owner; also that of unfinished uploads.
 BROKEN = frozenset({errno.EIO, errno.ESTALE, errno.EROFS, errno.EACCES, errno.EPERM})
 POSTGRESQL_DISK_FULL = "53100"
@@ -83,9 +86,11 @@ def outage_of(fault: BaseException | None) -> Outage | None:
     return None
 
 
-def answered(fault: BaseException | None) -> Outage | None:
-    """Return the outage that a fault is a sign of, and log it, since it becomes an answer."""
+def answered(fault: BaseException | None, *, marks: dict[str, Any]) -> Outage | None:
+    """Return the outage that a fault is a sign of; log it, and mark the request that it answers."""
     outage = outage_of(fault)
+    if outage is not None:
+        marks[MARK] = outage.code
     if outage is BUSY:
         log.warning("too_many_downloads")
     elif outage is not None:

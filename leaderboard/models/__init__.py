@@ -12,6 +12,7 @@ from leaderboard.models.benchmark import (
 )
 from leaderboard.models.boards import BoardVersion
 from leaderboard.models.cache_table import CachedValue
+from leaderboard.models.faults import Fault
 from leaderboard.models.inference import Analysis, Comparison, EditionRanges
 from leaderboard.models.installation import Installation
 from leaderboard.models.mails import Mail, MailKind

@@ -23,6 +23,13 @@ class SweepBeat(models.Model):
     # What was removed because no submission named it, since the beginning; see `upkeep.pollers`.
     cleaned_at = models.DateTimeField(null=True, blank=True)
 
+    # The file store, as a worker last found it; see `upkeep.store_check`.
+    store_begun_at = models.DateTimeField(null=True, blank=True)
+    store_checked_at = models.DateTimeField(null=True, blank=True)
+    store_free_bytes = models.PositiveBigIntegerField(
+        null=True, blank=True, help_text="Room for further files; empty if unknown."
+    )
+
     class Meta:
         constraints = [models.CheckConstraint(condition=Q(id=1), name="one_sweep_beat")]
 

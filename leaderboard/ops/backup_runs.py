@@ -3,11 +3,14 @@
 from datetime import datetime, timedelta
 from typing import Final
 
-from django.db.models import Q
+from django.conf import settings
+from django.db.models import Q, QuerySet
 
 from leaderboard.models import BackupRun
 
 KEPT: Final = timedelta(days=400)
+# A run without an end was killed if it began so long ago.
+LONGEST: Final = timedelta(hours=12)
 _MAX_CHARACTERS: Final = 2_000
 
 
@@ -36,9 +39,24 @@ def last_good(*, using: str = "default") -> BackupRun | None:
     return BackupRun.objects.using(using).filter(is_ok=True).order_by("-finished_at").first()
 
 
-def last_failed(*, using: str = "default") -> BackupRun | None:
-    """Return the latest backup that ended badly after the last good one began."""
+def failed_since_good(*, now: datetime, using: str = "default") -> QuerySet[BackupRun]:
+    """Return the backups since the last good one that ended badly, or never ended; the latest first."""
     good = last_good(using=using)
     since = Q(started_at__gt=good.started_at) if good else Q()
-    failed = BackupRun.objects.using(using).filter(since, is_ok=False).exclude(finished_at=None)
-    return failed.order_by("-started_at").first()
+    is_over = ~Q(finished_at=None) | Q(started_at__lt=now - LONGEST)
+    return BackupRun.objects.using(using).filter(since, is_over, is_ok=False).order_by("-started_at")
+
+
+def is_overdue(*, now: datetime, using: str = "default") -> bool:
+    """Say whether the last good backup is older than `TSTTC_MAX_BACKUP_AGE_H`.
+
+    A site that never made a backup has none to miss. One whose backups all failed misses one.
+    """
+    if not settings.MAX_BACKUP_AGE_H:
+        return False
+    good = last_good(using=using)
+    since = good.finished_at if good else None
+    if good is None:
+        first = BackupRun.objects.using(using).order_by("started_at").first()
+        since = first.started_at if first else None
+    return since is not None and since < now - timedelta(hours=settings.MAX_BACKUP_AGE_H)

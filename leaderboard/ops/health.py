@@ -1,11 +1,15 @@
-"""Health: database and broker answer, sweeps run. Each check is bounded in time, and none raises."""
+"""Health: what a person has to look at. Each check is bounded in time, writes nothing, and none raises.
+
+Workers write what they find (`faults`, `SweepBeat`); strangers may read the checks, so they name kinds of
+faults, and numbers and reasons are for the metrics and the maintainers' page.
+"""
 
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import timedelta
-from typing import Any
+from datetime import datetime, timedelta
+from typing import Any, Final
 
 import structlog
 from django.conf import settings
@@ -14,10 +18,12 @@ from django.db import connections
 from django.db.models import F
 from django.db.models.functions import Now
 from django.db.utils import load_backend
+from django.utils import timezone
 from kombu import Connection
 from kombu.exceptions import KombuError
 
-from leaderboard.models import AuditEvent, Installation, SweepBeat
+from leaderboard.models import AuditEvent, Installation, Mail, SweepBeat
+from leaderboard.ops import backup_runs, faults
 
 log = structlog.get_logger(__name__)
 
@@ -25,6 +31,11 @@ CHECK_TIMEOUT_S = 2
 """How long one check may take. PostgreSQL's client knows no shorter time for connecting."""
 MAX_SWEEP_AGE_S = 60.0
 MAX_UNSEALED_AGE_S = 120.0
+MAX_MAIL_AGE: Final = timedelta(hours=1)
+# An upload that the site refused is of interest until one is accepted, or until nobody has tried for so long.
+MAX_REFUSAL_AGE: Final = timedelta(hours=1)
+# Room for so many of the largest prediction files; at 20 files a day some days.
+MIN_FREE_FILES: Final = 100
 PROBE = "probe"
 
 
@@ -66,7 +77,7 @@ def has_recent_sweep() -> bool:
 
 
 def checks() -> tuple[Check, ...]:
-    """Check database, sweep and broker, within about three times `CHECK_TIMEOUT_S`."""
+    """Check everything, within about three times `CHECK_TIMEOUT_S`."""
     return (*_database(), broker())
 
 
@@ -95,13 +106,14 @@ def _database() -> tuple[Check, ...]:
             n_without = n_out_of_reach(using=alias)
             unsealed = AuditEvent.objects.using(alias).unsealed()
             is_of_other = Installation.objects.using(alias).exclude(store_is_of="").exists()
+            lasting = _lasting(now=timezone.now(), using=alias)
     except DatabaseProblem as fault:
         log.warning("database_not_ready", reason=str(fault)[:200])
         return (
             Check("database", is_ok=False, detail="does not answer"),
             *(
                 Check(name, is_ok=False, detail="unknown: the database does not answer")
-                for name in ("sweep", "ground truth", "audit log", "file store owner")
+                for name in ("sweep", "ground truth", "audit log", "file store owner", *LASTING)
             ),
         )
     return (
@@ -110,7 +122,82 @@ def _database() -> tuple[Check, ...]:
         _ground_truth(n_without),
         _audit(unsealed.oldest_age_s),
         _store_owner(is_of_other),
+        *lasting,
     )
+
+
+LASTING: Final = ("file store", "free space", "uploads", "statistics", "backup", "mail")
+
+
+def _lasting(*, now: datetime, using: str) -> tuple[Check, ...]:
+    """Check what workers, web processes and backups have written down."""
+    return (
+        _well("file store", is_ok=can_store(now=now, using=using), fault="files cannot be stored"),
+        _well(
+            "free space",
+            is_ok=has_room(free_bytes(using=using)),
+            fault="the file store has little room",
+            is_vital=False,
+        ),
+        _well(
+            "uploads",
+            is_ok=not refuses_uploads(now=now, using=using),
+            fault="an upload was refused because of an error of the site",
+        ),
+        _well(
+            "statistics",
+            is_ok=not failing_statistics(now=now, using=using),
+            fault="intervals, comparisons or analyses fail again and again",
+        ),
+        _well(
+            "backup",
+            is_ok=not backup_runs.is_overdue(now=now, using=using),
+            fault="the last good backup is old",
+        ),
+        _well("mail", is_ok=not mails_wait(now=now, using=using), fault="a mail waits for the mail server"),
+    )
+
+
+def _well(name: str, *, is_ok: bool, fault: str, is_vital: bool = True) -> Check:
+    return Check(name, is_ok=is_ok, detail="no fault known" if is_ok else fault, is_vital=is_vital)
+
+
+def can_store(*, now: datetime, using: str = "default") -> bool:
+    """Say whether the last check of the file store could write; True before the first one."""
+    return not faults.present([faults.STORE], now=now, using=using).exists()
+
+
+def free_bytes(*, using: str = "default") -> int | None:
+    """Return the room of the file store as a worker last found it; None if unknown."""
+    return SweepBeat.objects.using(using).values_list("store_free_bytes", flat=True).first()
+
+
+def min_free_bytes() -> int:
+    return MIN_FREE_FILES * settings.MAX_PREDICTIONS_BYTES
+
+
+def has_room(n_bytes: int | None) -> bool:
+    """Say whether so much room is enough for some days."""
+    return n_bytes is None or n_bytes >= min_free_bytes()
+
+
+def refuses_uploads(*, now: datetime, using: str = "default") -> bool:
+    """Say whether the site refused an upload within `MAX_REFUSAL_AGE`, and has accepted none since."""
+    refused = faults.present([faults.UPLOADS], now=now, using=using)
+    return refused.filter(last_at__gte=now - MAX_REFUSAL_AGE).exists()
+
+
+def failing_statistics(*, now: datetime, using: str = "default") -> list[str]:
+    """Return the kinds of statistics that fail again and again."""
+    rows = faults.present(faults.STATISTICS, now=now, min_times=faults.MIN_TIMES, using=using)
+    return sorted(set(rows.values_list("kind", flat=True)))
+
+
+def mails_wait(*, now: datetime, using: str = "default") -> bool:
+    """Say whether a mail waits longer than `MAX_MAIL_AGE` for the mail server alone."""
+    old = Mail.objects.using(using).filter(ended_at=None, queued_at__lt=now - MAX_MAIL_AGE)
+    # One that the server puts off has a reason of its own.
+    return settings.SENDS_MAIL and old.filter(reason="").exists()
 
 
 def _ground_truth(n_without: int) -> Check:

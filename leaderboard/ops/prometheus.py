@@ -4,21 +4,23 @@ Figures of HTTP are a process's own; processes of one gunicorn share `PROMETHEUS
 `deploy/gunicorn.conf.py`.
 """
 
+import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from datetime import timedelta
+from datetime import datetime, timedelta
 from functools import partial
 from typing import Any, Final
 
 from django.db.models import Count, F, Min, Sum
 from django.db.models.functions import Now
+from django.utils import timezone
 from prometheus_client import CollectorRegistry, Counter, Histogram, disable_created_metrics, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.multiprocess import MultiProcessCollector
 from prometheus_client.registry import Collector
 
-from leaderboard.models import AuditEvent, Evaluation, Mail, Status, SweepBeat
-from leaderboard.ops import health
+from leaderboard.models import AuditEvent, Evaluation, Fault, Mail, Status, SweepBeat
+from leaderboard.ops import backup_runs, faults, health
 
 PRIORITIES: Final = {Evaluation.PRIORITY_LIVE: "live", Evaluation.PRIORITY_RESCORE: "rescore"}
 
@@ -39,12 +41,18 @@ class DatabaseCollector(Collector):
         yield from _queue(list(_by_status()))
         yield _gauge(
             "tsttc_last_sweep_age_seconds",
-            "Time since the queue was last looked after; NaN if it never was.",
-            {(): _or_nan(health.sweep_age_s())},
+            "Time since the queue was last looked after; +Inf if it never was.",
+            {(): _or(health.sweep_age_s(), math.inf)},
         )
         yield from _cleaning()
         yield from _sealing()
         yield from _mails()
+        yield from _lasting(now=timezone.now())
+        yield from _store()
+        yield from _backups(now=timezone.now())
+        yield _gauge(
+            "tsttc_broker_up", "1 if the broker answers, else 0.", {(): float(health.broker().is_ok)}
+        )
 
 
 # --- the queue and the states ---------------------------------------------------------------------------
@@ -57,8 +65,6 @@ def _by_status() -> Iterable[Mapping[str, Any]]:
         .annotate(
             n=Count("pk"),
             n_attempts=Sum("attempt"),
-            n_poison=Sum("n_poison_strikes"),
-            n_infrastructure=Sum("n_infrastructure_strikes"),
             oldest_age=Now() - Min("queued_at"),
         )
     )
@@ -95,13 +101,11 @@ def _queue(rows: list[Mapping[str, Any]]) -> Iterator[Metric]:
         {(status.lower(),): n_by_status[status] for status in (Status.SCORED, Status.REJECTED)},
         labels=["outcome"],
     )
-    yield _gauge(
+    n_strikes = {row.subject: row.n_ever for row in Fault.objects.filter(kind=faults.STRIKES)}
+    yield _counter(
         "tsttc_strikes",
-        "Runs that came to nothing, by kind; a maintainer's retry wipes those of its evaluation.",
-        {
-            ("poison",): sum(row["n_poison"] for row in rows),
-            ("infrastructure",): sum(row["n_infrastructure"] for row in rows),
-        },
+        "Runs that came to nothing, by kind.",
+        {(kind,): n_strikes.get(kind, 0) for kind in ("poison", "infrastructure")},
         labels=["kind"],
     )
 
@@ -111,8 +115,8 @@ def _cleaning() -> Iterator[Metric]:
     age = beat.age if beat else None
     yield _gauge(
         "tsttc_last_clean_age_seconds",
-        "Time since stored files that no submission names were last looked for; NaN if they never were.",
-        {(): _or_nan(None if age is None else age.total_seconds())},
+        "Time since stored files that no submission names were last looked for; +Inf if they never were.",
+        {(): _or(None if age is None else age.total_seconds(), math.inf)},
     )
 
 
@@ -153,6 +157,54 @@ def _sealing() -> Iterator[Metric]:
     )
 
 
+# --- faults that last -----------------------------------------------------------------------------------
+
+
+def _lasting(*, now: datetime) -> Iterator[Metric]:
+    n_ever = dict(Fault.objects.order_by().values_list("kind").annotate(Sum("n_ever")))
+    present = dict.fromkeys(faults.KINDS, 0.0)
+    for row in faults.present(now=now):
+        if row.kind not in faults.STATISTICS or row.n_times >= faults.MIN_TIMES:
+            began_at = row.began_at or now
+            present[row.kind] = max(present[row.kind], (now - began_at).total_seconds())
+    yield _counter(
+        "tsttc_faults",
+        "Failures of the file store, of uploads and of statistics, since the beginning.",
+        {(kind,): n_ever.get(kind, 0) for kind in faults.KINDS},
+        labels=["kind"],
+    )
+    yield _gauge(
+        "tsttc_fault_age_seconds",
+        "How long the fault lasts; 0 if there is none.",
+        {(kind,): age_s for kind, age_s in present.items()},
+        labels=["kind"],
+    )
+
+
+def _store() -> Iterator[Metric]:
+    free_bytes = health.free_bytes()
+    yield _gauge(
+        "tsttc_store_free_bytes",
+        "Room of the file store as a worker last found it; NaN if unknown, as for a bucket.",
+        {(): _or(free_bytes, math.nan)},
+    )
+
+
+def _backups(*, now: datetime) -> Iterator[Metric]:
+    good = backup_runs.last_good()
+    ended_at = good.finished_at if good else None
+    yield _gauge(
+        "tsttc_last_backup_age_seconds",
+        "Time since the last good backup ended; NaN if there is none.",
+        {(): math.nan if ended_at is None else (now - ended_at).total_seconds()},
+    )
+    yield _gauge(
+        "tsttc_backups_failed",
+        "Backups since the last good one that were not good.",
+        {(): backup_runs.failed_since_good(now=now).count()},
+    )
+
+
 # --- Prometheus' words ----------------------------------------------------------------------------------
 
 
@@ -173,8 +225,8 @@ def _family(
 _gauge, _counter = partial(_family, GaugeMetricFamily), partial(_family, CounterMetricFamily)
 
 
-def _or_nan(value: float | None) -> float:
-    return float("nan") if value is None else value
+def _or(value: float | None, otherwise: float) -> float:
+    return otherwise if value is None else value
 
 
 # --- how the web processes answer -------------------------------------------------------------------------
@@ -188,6 +240,18 @@ _REQUESTS: Final = Counter(
     "tsttc_http_requests",
     "Answers of the web processes on this machine since they were started.",
     ["method", "route", "status"],
+    registry=_OWN,
+)
+# Without labels: a figure that appears with its first error never rises, and no alarm sees it.
+_SERVER_ERRORS: Final = Counter(
+    "tsttc_http_server_errors",
+    "Answers 5xx of the web processes on this machine since they were started.",
+    registry=_OWN,
+)
+SLOW_S: Final = 1.0
+_SLOW_BOARDS: Final = Counter(
+    "tsttc_http_slow_boards",
+    "Pages of boards that took over a second, of the web processes on this machine since they were started.",
     registry=_OWN,
 )
 _SECONDS: Final = Histogram(
@@ -205,6 +269,10 @@ def count(*, method: str, route: str, status: int, took_s: float) -> None:
     method = method if method in _METHODS else "other"
     _REQUESTS.labels(method, route, f"{status // 100}xx").inc()
     _SECONDS.labels(route).observe(took_s)
+    if status >= 500:
+        _SERVER_ERRORS.inc()
+    if route == "board" and took_s > SLOW_S:
+        _SLOW_BOARDS.inc()
 
 
 def registry() -> CollectorRegistry:

@@ -27,10 +27,10 @@ from django.db.models import F, Q, QuerySet
 from django.db.models.functions import Least, Now
 
 from leaderboard import audit, board_versions
-from leaderboard.db.clock import after
+from leaderboard.db.clock import after, database_now
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, User
 from leaderboard.models.submissions import MAX_INFRASTRUCTURE_STRIKES, MAX_POISON_STRIKES
-from leaderboard.ops import broker
+from leaderboard.ops import broker, faults
 
 log = structlog.get_logger(__name__)
 
@@ -341,6 +341,8 @@ def _strike(
     )
     if exhausted:
         audit.record_of(evaluation, "system_error", details={"reason": reason})
+    # A counter of its own, the last that is locked: a retry wipes the strikes of its evaluation.
+    faults.note(faults.STRIKES, subject=strike.value.lower(), reason=reason, now=database_now())
     return status
 
 

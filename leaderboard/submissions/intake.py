@@ -17,6 +17,7 @@ from leaderboard import audit, board_versions
 from leaderboard.errors.refusals import Refused, clean_text, shown_split
 from leaderboard.methods import editing
 from leaderboard.models import Edition, Method, SentFile, Split, Submission, Team, User
+from leaderboard.ops import faults
 from leaderboard.people import teams
 from leaderboard.people.names import clean_name
 from leaderboard.queue import lifecycle
@@ -95,6 +96,7 @@ def submit(request: SubmissionRequest) -> Submitted:
         files.require_unchanged(upload, digest=file.digest)
         submitted = _record(request, file, split=split)
     if submitted.is_new:
+        faults.clear(faults.UPLOADS)
         log.info(
             "submission_received",
             submission_id=str(submitted.submission.pk),

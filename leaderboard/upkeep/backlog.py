@@ -1,7 +1,8 @@
 """Jobs of low priority, found in the database: count changed labels, compare, compute intervals, analyse."""
 
 import random
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 
@@ -9,8 +10,9 @@ import structlog
 from django.db import InterfaceError, OperationalError
 
 from leaderboard.editions import ground_truth
+from leaderboard.ops import faults
 from leaderboard.queue import worker
-from leaderboard.statistics import analyses, comparison_queue, comparisons, confidence, recording_sums
+from leaderboard.statistics import analyses, comparison_queue, comparisons, confidence
 from leaderboard.storage import truth_values
 
 log = structlog.get_logger(__name__)
@@ -23,43 +25,57 @@ class Stopping(Exception):
     """The worker is to end; another worker begins the task again."""
 
 
+@dataclass(frozen=True)
+class Job:
+    """A job of a kind of `faults.STATISTICS`. `do` may return False: the job stays to be done."""
+
+    kind: str
+    subject: str
+    do: Callable[[], object]
+
+
 def work_off(*, now: datetime, rng: random.Random, is_stopping: Callable[[], bool] = lambda: False) -> int:
     """Do the waiting jobs that this worker has the values for. Returns how many.
 
-    What fails is logged and left for the next time. A fault that nobody foresaw is raised once all other jobs
-    have had their turn.
+    What fails is left for the next time, and noted in `faults`. Raises the database's error.
     """
     between = partial(_yield_to_live_work, rng=rng, is_stopping=is_stopping)
-    n_done, bugs = 0, list[Exception]()
+    n_done = 0
+    done: set[tuple[str, str]] = set()
+    failed: dict[tuple[str, str], Exception] = {}
     try:
-        for task in _tasks(now=now, between=between):
+        for job in _jobs(now=now, between=between):
+            between()
             try:
-                n_done += _done(task, between)
+                # False: another worker does it, or has to do it again.
+                if job.do() is not False:
+                    done.add((job.kind, job.subject))
+                n_done += 1
             except (Stopping, OperationalError, InterfaceError):
                 raise
-            except Exception as bug:  # noqa: BLE001 - raised below
-                bugs.append(bug)
+            except Exception as fault:  # noqa: BLE001 - whatever it is, the other jobs do not wait for it
+                failed[job.kind, job.subject] = fault
     except Stopping:
-        return 0
-    if bugs:
-        raise bugs[0]
+        pass
+    _note(failed, now=now)
+    for kind, subject in done - failed.keys():
+        faults.clear(kind, subject=subject)
     return n_done
 
 
-def _done(task: Callable[[], object], between: Callable[[], None]) -> bool:
-    between()
-    try:
-        task()
-    except recording_sums.FAULTS as fault:
-        log.warning("backlog_failed", reason=f"{type(fault).__name__}: {fault}"[:200])
-        return False
-    return True
+def _note(failed: Mapping[tuple[str, str], Exception], *, now: datetime) -> None:
+    for (kind, subject), fault in failed.items():
+        reason = f"{type(fault).__name__}: {fault}"
+        # Logged once: from then on it is a state, which /healthy, the metrics and the maintainers' page show.
+        if faults.note(kind, subject=subject, reason=reason, now=now):
+            log.error("backlog_failed", kind=kind, subject=subject, reason=reason[:500], exc_info=fault)
 
 
-def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[], object]]:
+def _jobs(*, now: datetime, between: Callable[[], None]) -> Iterator[Job]:
     readable_truths = truth_values.readable_digests()
     for old, new in ground_truth.uncompared(readable_truths=readable_truths):
-        yield partial(ground_truth.count_changes, old, new)
+        subject = f"{old.short_digest} and {new.short_digest}"
+        yield Job(faults.LABEL_CHANGES, subject, partial(ground_truth.count_changes, old, new))
     asked = comparison_queue.waiting(readable_truths=readable_truths).select_related(
         "edition__ground_truth", "edition__split", "first__submission__method", "second__submission__method"
     )
@@ -67,13 +83,15 @@ def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[
     # Asked again each time: a user may wait for a pair by now, while others were only noted.
     while len(begun) < MAX_AT_ONCE and (row := asked.exclude(pk__in=begun).first()) is not None:
         begun.append(row.pk)
-        yield partial(comparisons.compute, row, now=now)
+        yield Job(faults.COMPARISONS, str(row.edition), partial(comparisons.compute, row, now=now))
     # Before entries are read: those of what waits are to be among them.
     between()
     for entries in confidence.stale(now=now, readable_truths=readable_truths):
-        yield partial(confidence.infer, entries, now=now, between=between)
+        infer = partial(confidence.infer, entries, now=now, between=between)
+        yield Job(faults.INTERVALS, str(entries.edition), infer)
     for evaluation in analyses.missing(readable_truths=readable_truths)[:MAX_AT_ONCE]:
-        yield partial(analyses.make, evaluation, now=now)
+        make = partial(analyses.make, evaluation, now=now)
+        yield Job(faults.ANALYSES, str(evaluation.edition), make)
 
 
 def _yield_to_live_work(*, rng: random.Random, is_stopping: Callable[[], bool]) -> None:

@@ -24,7 +24,7 @@ from leaderboard.queue import lifecycle, worker
 from leaderboard.quotas import mailboxes
 from leaderboard.statistics import analyses
 from leaderboard.storage import orphans, truth_values
-from leaderboard.upkeep import backlog
+from leaderboard.upkeep import backlog, store_check
 
 log = structlog.get_logger(__name__)
 
@@ -47,7 +47,7 @@ def poll(*, rng: random.Random, stopping: threading.Event) -> int:
 
 
 def keep_up(*, rng: random.Random, stopping: threading.Event) -> None:
-    """Sweep, send mails and clean, each when it is due and no other process has begun to."""
+    """Sweep, send mails, check the store and clean, each when it is due and no other process has begun to."""
     SweepBeat.objects.get_or_create(pk=SweepBeat.THE_ONE)
     if _begun("sweep_begun_at", every_s=settings.SWEEP_S):
         sweep(rng=rng)
@@ -56,6 +56,8 @@ def keep_up(*, rng: random.Random, stopping: threading.Event) -> None:
         now = clock.database_now()
         notices.queue_due(now=now)
         outbox.work_off(now=now, is_stopping=stopping.is_set)
+    if _begun("store_begun_at", every_s=store_check.EVERY_S):
+        store_check.check(now=clock.database_now())
     if _begun("clean_begun_at", every_s=settings.CLEAN_S):
         clean(now=clock.database_now())
 

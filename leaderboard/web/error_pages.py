@@ -13,7 +13,7 @@ SORRY = "This was an error on our side. We logged it; try again later."
 
 def server_error(request: HttpRequest) -> HttpResponse:
     """Answer 503 or 507 where the cause is known, else 500, without the database."""
-    outage = outages.answered(sys.exception())
+    outage = outages.answered(sys.exception(), marks=request.META)
     status, code, sentence, headers = (
         (outage.status, outage.code, outage.sentence, outage.headers)
         if outage is not None

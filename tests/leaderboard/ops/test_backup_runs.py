@@ -17,14 +17,14 @@ def test_a_failure_before_the_last_good_backup_is_of_no_interest():
     now = timezone.now()
     first = backup_runs.begin(now - 3 * HOUR)
     backup_runs.finish(first, now=now - 2 * HOUR, is_ok=False, fault="the disk is full")
-    assert backup_runs.last_failed() == first
+    assert backup_runs.failed_since_good(now=now).get() == first
     assert backup_runs.last_good() is None
 
     second = backup_runs.begin(now - HOUR)
     backup_runs.finish(second, now=now, is_ok=True, n_files=4)
 
     assert backup_runs.last_good() == second
-    assert backup_runs.last_failed() is None
+    assert not backup_runs.failed_since_good(now=now).exists()
 
 
 def test_a_failure_after_the_last_good_backup_is_kept_with_its_reason():
@@ -36,7 +36,7 @@ def test_a_failure_after_the_last_good_backup_is_kept_with_its_reason():
         bad, now=now, is_ok=False, n_files=3, n_damaged=1, fault="predictions/ab.json: damaged"
     )
 
-    failed = backup_runs.last_failed()
+    failed = backup_runs.failed_since_good(now=now).first()
 
     assert failed is not None
     assert (failed.n_files, failed.n_damaged, failed.fault) == (3, 1, "predictions/ab.json: damaged")

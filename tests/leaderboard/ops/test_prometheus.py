@@ -57,8 +57,8 @@ def test_runs_are_counted_by_their_outcome(edition: Edition, owner: User) -> Non
     assert metrics['tsttc_runs_finished_total{outcome="rejected"}'] == 1
     assert metrics["tsttc_running"] == 1
     assert metrics['tsttc_queue_depth{priority="live"}'] == 1
-    assert metrics['tsttc_strikes{kind="infrastructure"}'] == 1
-    assert metrics['tsttc_strikes{kind="poison"}'] == 0
+    assert metrics['tsttc_strikes_total{kind="infrastructure"}'] == 1
+    assert metrics['tsttc_strikes_total{kind="poison"}'] == 0
 
 
 # --- who may read them ----------------------------------------------------------------------------------

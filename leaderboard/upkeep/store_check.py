@@ -1,0 +1,57 @@
+"""Check the file store: write, read and remove a small file, and ask how much room is left."""
+
+import shutil
+from datetime import datetime
+from pathlib import Path
+from typing import Final
+
+import structlog
+from django.core.files.base import ContentFile
+from django.core.files.storage import FileSystemStorage
+
+from leaderboard.models import SweepBeat
+from leaderboard.ops import faults
+from leaderboard.storage import files
+
+log = structlog.get_logger(__name__)
+
+EVERY_S: Final = 60.0
+# Beside the prediction files, so that it needs the rights that they need; no digest has this name.
+PROBE: Final = "predictions/probe"
+_CONTENT: Final = b"This file shows that the file store can be written to.\n"
+
+
+def check(*, now: datetime) -> None:
+    """Note whether files can be stored, and the room that is left. Raises the database's error."""
+    free_bytes: int | None = None
+    try:
+        free_bytes = _free_bytes()
+        _try()
+    except OSError as fault:
+        reason = f"{type(fault).__name__}: {fault}"
+        if faults.note(faults.STORE, reason=reason, now=now):
+            log.error("store_cannot_be_written", reason=reason[:500])
+    else:
+        faults.clear(faults.STORE)
+    SweepBeat.objects.update(store_checked_at=now, store_free_bytes=free_bytes)
+
+
+def _try() -> None:
+    store = files.store()
+    store.save(PROBE, ContentFile(_CONTENT))
+    with files.open_named(PROBE) as kept:
+        read = kept.read()
+    store.delete(PROBE)
+    if read != _CONTENT:
+        raise OSError("the file store returned other bytes than were stored")
+
+
+def _free_bytes() -> int | None:
+    """Return the room of a local store; None of a bucket, which does not tell."""
+    store = files.store()
+    if not isinstance(store, FileSystemStorage):
+        return None
+    folder = Path(store.location)
+    while not folder.exists():
+        folder = folder.parent
+    return shutil.disk_usage(folder).free
