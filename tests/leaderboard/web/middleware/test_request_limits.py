@@ -1,10 +1,14 @@
 """How often one may send and draw pages: the same rates, counts and words as the API's."""
 
+from pathlib import Path
+
 import pytest
 from django.core.cache import cache
+from django.core.files.base import ContentFile
 from django.test import Client
 from pytest_django import Settings
 
+from leaderboard.management.commands import demo
 from leaderboard.models import Edition, User
 from leaderboard.ops import rate_limits
 from tests import pages
@@ -93,6 +97,29 @@ def test_searches_have_a_rate_of_their_own_and_the_empty_page_does_not_count() -
     rate_limits.IN_PROCESS.clear()
     assert [visitor.get(f"/docs/search/?q=quota{n}").status_code for n in range(3)] == [200, 200, 429]
     assert Client(REMOTE_ADDR=ELSEWHERE).get("/docs/search/?q=quota").status_code == 200
+
+
+def test_too_large_a_file_is_refused_with_the_limit_and_with_gzip_in_the_form_of_its_address(
+    owner: User, settings: Settings
+) -> None:
+    settings.MAX_PREDICTIONS_BYTES = 2_000_000
+    first, second = (ContentFile(b" " * 2_200_000, name="predictions.json") for _ in range(2))
+    problem = client_of(owner).post("/api/v1/submissions", {"file": first}, format="multipart")
+    page = signed_in(owner).post("/submit/", {"file": second})
+    assert (problem.status_code, page.status_code) == (413, 413)
+    assert (problem["Content-Type"], problem.json()["code"]) == ("application/problem+json", "too-large")
+    for text in (problem.json()["detail"], page.text):
+        assert "expected at most 2 MB" in text.replace("\u00a0", " ")
+        assert "gzip" in text
+
+
+def test_the_server_of_the_demo_leaves_it_to_the_site_to_refuse_a_large_file(
+    settings: Settings, tmp_path: Path
+) -> None:
+    settings.DATA_DIR = tmp_path
+    web, _ = demo.processes("127.0.0.1", 8000, address="http://127.0.0.1:8000")
+    [most] = [part.partition("=")[2] for part in web.command if part.startswith("--max-request-body-size=")]
+    assert int(most) > 2 * settings.MAX_PREDICTIONS_BYTES
 
 
 def test_monitoring_and_the_api_are_not_counted_as_pages(owner: User) -> None:
