@@ -13,6 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final
 
+import structlog
 from django.db import Error as DatabaseProblem
 from django.db import connection
 
@@ -22,6 +23,8 @@ from leaderboard.backups.contents import Contents, NoBackup
 from leaderboard.db import clock
 from leaderboard.ops import backup_runs
 from leaderboard.submissions import receipts
+
+log = structlog.get_logger(__name__)
 
 _ROWS: Final = re.compile(r"database-\d{8}T\d{12}")
 
@@ -134,6 +137,9 @@ def _alone_in(folder: Path) -> Iterator[None]:
             raise NoBackup(
                 f"Another backup is being written into {folder}; expected one at a time."
             ) from None
+        except OSError as fault:
+            # Some network file systems have no locks; a backup without one is better than none.
+            log.warning("backup_without_lock", reason=fault.strerror)
         yield
     finally:
         os.close(handle)

@@ -1,4 +1,4 @@
-"""Unknown keys of a rejected file that belong to sequences of another edition: the problem says of which."""
+"""Unknown keys of a rejected file that belong to sequences of another edition: the problem names it."""
 
 from dataclasses import replace
 

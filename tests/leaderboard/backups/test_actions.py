@@ -31,6 +31,7 @@ def forget_since(n_events: int) -> None:
     last = AuditEvent.objects.order_by("pk")[n_events - 1].pk if n_events else 0
     with connection.cursor() as cursor:
         if connection.vendor == "postgresql":
+            cursor.execute("SET CONSTRAINTS ALL IMMEDIATE")
             cursor.execute("ALTER TABLE leaderboard_auditevent DISABLE TRIGGER audit_append_only")
         cursor.execute("DELETE FROM leaderboard_auditevent WHERE id > %s", [last])
 

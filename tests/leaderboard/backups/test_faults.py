@@ -1,5 +1,7 @@
 """One bad file of the site stops no backup: it is named, all else is saved, and no good copy is lost."""
 
+import errno
+import fcntl
 import os
 from pathlib import Path
 
@@ -228,6 +230,16 @@ def test_two_backups_at_once_into_one_folder_are_refused(sent: list[Submission],
     make(folder)
     with backup._alone_in(folder), pytest.raises(NoBackup, match="Another backup is being written"):
         make(folder)
+    assert make(folder).faults == {}
+
+
+def test_a_file_system_without_locks_is_no_obstacle(
+    sent: list[Submission], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(handle: int, operation: int) -> None:
+        raise OSError(errno.EBADF, "Bad file descriptor")
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
     assert make(folder).faults == {}
 
 

@@ -1,4 +1,4 @@
-"""A file with keys of sequences that a correction removed is told so; of drafts nothing is told."""
+"""A file with keys that a correction removed gets a message with the edition; drafts are never named."""
 
 import json
 from pathlib import Path
