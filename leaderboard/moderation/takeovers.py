@@ -162,8 +162,7 @@ def undo(*, secret: str, since: int | None, now: datetime) -> User:
             )
         kept = [each for each in wanted if each not in taken]
         kept = kept if link.address in kept else [link.address, *kept]
-        mailboxes.keep(user=user, now=now)
-        _set_addresses(user, kept)
+        _set_addresses(user, kept, now=now)
         _shut(user, since=chosen.at - _MOMENT, now=now, actor=None, how="the account was recovered")
         AccountChange.objects.filter(user=user, undone_at=None, at__gte=chosen.at).update(undone_at=now)
         audit.record_of(user, "recovered", details={"n_changes": len(link.changes)})
@@ -191,8 +190,7 @@ def give_back(*, user: User, address: str, reason: str, actor: User | None, now:
                 field="address",
             )
         former = proved(row)
-        mailboxes.keep(user=row, now=now)
-        _set_addresses(row, [address])
+        _set_addresses(row, [address], now=now)
         _shut(row, since=None, now=now, actor=actor, how=f"by a maintainer: {reason}")
         # No link of before brings anybody else back.
         AccountChange.objects.filter(user=row, undone_at=None).update(undone_at=now)
@@ -206,8 +204,10 @@ def _is_taken(address: str, user: User) -> bool:
     return addresses.accounts_of(address).exclude(pk=user.pk).exists()
 
 
-def _set_addresses(user: User, kept: Sequence[str]) -> None:
+def _set_addresses(user: User, kept: Sequence[str], *, now: datetime) -> None:
     """Make these the addresses of the account, all proved, the first one primary."""
+    # What was sent counts for the mailboxes of before and for those of now.
+    mailboxes.keep(user=user, now=now)
     for address in kept:
         addresses.release(address=address, to=user)
     own: QuerySet[EmailAddress] = EmailAddress.objects.filter(user=user)
@@ -218,13 +218,15 @@ def _set_addresses(user: User, kept: Sequence[str]) -> None:
             user=user, email=address, defaults={"verified": True, "primary": number == 0}
         )
     user.email = kept[0]
+    user.save(update_fields=["email"])
+    mailboxes.keep(user=user, now=now)
 
 
 def _shut(user: User, *, since: datetime | None, now: datetime, actor: User | None, how: str) -> None:
     """End passwords, tokens, apps and connected accounts; the last two only if they came later."""
     # Open sessions and mailed links to reset the password rest on it.
     user.set_unusable_password()
-    user.save(update_fields=["email", "password"])
+    user.save(update_fields=["password"])
     for token in user.auth_token_set.filter(revoked_at=None):
         tokens.revoke(token=token, now=now, actor=actor, how=how)
     apps, connected = Authenticator.objects.filter(user=user), SocialAccount.objects.filter(user=user)

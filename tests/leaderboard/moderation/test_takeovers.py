@@ -14,7 +14,7 @@ from django.utils import timezone
 from pytest_django import Settings
 
 from leaderboard.errors.refusals import NotMaintainer, Refused
-from leaderboard.models import AccountChange, ApiToken, AuditEvent, Mail, User
+from leaderboard.models import AccountChange, ApiToken, AuditEvent, Edition, Mail, SpentMailbox, User
 from leaderboard.moderation import forgetting, takeovers
 from leaderboard.people import addresses, teams
 from tests import builders
@@ -322,6 +322,16 @@ def test_only_maintainers_give_accounts_back_and_not_those_of_maintainers(
     client = Client()
     client.force_login(stranger)
     assert client.post(f"/maintain/actions/give-back-account/{victim.pk}/", given).status_code == 404
+
+
+def test_a_changed_hand_gives_no_new_quota(victim: User, edition: Edition, maintainer: User) -> None:
+    builders.submit(victim, builders.predictions(edition))
+    now = timezone.now()
+    takeovers.give_back(user=victim, address="new@example.org", reason="r", actor=maintainer, now=now)
+    digests = set(SpentMailbox.objects.filter(account=victim).values_list("digest", flat=True))
+    assert len(digests) == 3, "of both former mailboxes and of the new one"
+    forgetting.forget(user=User.objects.get(pk=victim.pk), reason="r", actor=maintainer, now=now)
+    assert SpentMailbox.objects.filter(account=victim).count() == 3
 
 
 # --- what is left ----------------------------------------------------------------------------------------
