@@ -12,12 +12,40 @@ Floats = NDArray[np.float64]
 
 
 def as_floats(values: Any) -> Floats:
-    """Convert to float64 of the same shape; a tensor may have bfloat16, a gradient and any device."""
+    """Convert to float64 of the same shape; a tensor may have bfloat16, a gradient and any device.
+
+    Masked entries become NaN: there is no value. Raises `TypeError` for complex numbers, dates and durations.
+    """
     if hasattr(values, "detach"):
+        if "complex" in str(getattr(values, "dtype", "")):
+            raise TypeError(f"The values are of type {values.dtype}; expected real numbers.")
         values = values.detach().cpu().double()  # on the CPU first: not every device has float64
     elif isinstance(values, list | tuple) and values and hasattr(values[0], "detach"):
         values = [as_floats(value) for value in values]
-    return np.asarray(values, dtype=np.float64)
+    array = np.ma.asanyarray(values) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+    if array.dtype.kind in "cmM":
+        raise TypeError(f"The values are of type {array.dtype}; expected real numbers.")
+    if isinstance(array, np.ma.MaskedArray):
+        return np.asarray(array.astype(np.float64).filled(np.nan))
+    return np.asarray(array, dtype=np.float64)
+
+
+def whole_numbers(values: Any, *, name: str) -> NDArray[np.int64]:
+    """Convert rows or other indices to int64 of the same shape; raises `TypeError` for floats and masks."""
+    if isinstance(values, list | tuple) and values and hasattr(values[0], "detach"):
+        return np.array([whole_numbers(value, name=name) for value in values])
+    if hasattr(values, "detach"):
+        values = values.detach().cpu()
+        kind = str(values.dtype)
+        is_whole = "int" in kind
+    else:
+        values = np.asarray(values)
+        kind, is_whole = str(values.dtype), values.dtype.kind in "iu" or values.size == 0
+    if not is_whole:
+        raise TypeError(
+            f"{name} are of type {kind}; expected whole numbers, such as rows of the ground truth."
+        )
+    return np.asarray(values).astype(np.int64)
 
 
 def in_row_order(values: Any, *, name: str, anno_id: NDArray[np.int64] | None) -> Floats:

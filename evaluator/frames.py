@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import Any, Final
 
 import pandas as pd
 
 from evaluator.arguments import require
-from evaluator.predictions.loading import NATURAL_KEY, Predictions, read_predictions
+from evaluator.predictions.loading import NATURAL_KEY, RATES, VALUES, Predictions, read_predictions
+from evaluator.truth.csv_tables import require_one_column
 from evaluator.truth.ground_truth import Manifest
+
+RATIO: Final = "scale_ratio"
 
 
 def manifest_frame(manifest: Manifest) -> pd.DataFrame:
@@ -25,18 +28,45 @@ def manifest_frame(manifest: Manifest) -> pd.DataFrame:
     )
 
 
-def predictions_from_frame(frame: pd.DataFrame, *, manifest: Manifest, column: str = "ttc_s") -> Predictions:
-    """Read predictions from a frame with one row per sequence, in any order: seconds in `column`.
+def predictions_from_frame(
+    frame: pd.DataFrame, *, manifest: Manifest, column: str | None = None
+) -> Predictions:
+    """Read predictions from a frame with one row per sequence, in any order, as a CSV table has them.
 
-    Keys are the columns `bag_stamp`, `cam_id`, `ts` and `track_id`, else `anno_id` (a column or the index).
-    Raises `Rejected` as for a file, `ValueError` for a frame without keys, `KeyError` for a missing column.
+    Values are seconds in `column`, by default `ttc` or `ttc_s`; or scale ratios in `scale_ratio`, with a
+    column `fps` or `frame_gap`. Keys are the columns `bag_stamp`, `cam_id`, `ts` and `track_id`, else
+    `anno_id` (a column or the index). Raises `Rejected` as for a file, `ValueError` for a frame without keys
+    or rates, `KeyError` for a missing column.
     """
     require(frame, pd.DataFrame, name="frame")
+    names = list(map(str, frame.columns))
+    if column is None:
+        column = _value_column(names)
     if column not in frame.columns:
-        raise KeyError(f"The frame has no column {column!r}; found {', '.join(map(str, frame.columns))}.")
-    pairs = zip(_keys(frame), frame[column].astype("float64"), strict=True)
-    members = ",".join(f"{json.dumps(str(key))}:{json.dumps(value)}" for key, value in pairs)
-    return read_predictions(f"{{{members}}}".encode(), manifest=manifest)
+        raise KeyError(f"The frame has no column {column!r}; found {', '.join(names)}.")
+    rates = [name for name in RATES if name in names] if column == RATIO else []
+    if column == RATIO and len(rates) != 1:
+        raise ValueError(
+            f"The column {RATIO!r} needs one column fps or frame_gap; found {', '.join(names)}. To read "
+            "it as seconds, rename it."
+        )
+    require_one_column(names, (*NATURAL_KEY, "anno_id", column, *rates), where="")
+    keys = [json.dumps(str(key)) for key in _keys(frame)]
+    predictions, *rest = (
+        "{" + ",".join(f"{key}:{json.dumps(value)}" for key, value in zip(keys, each, strict=True)) + "}"
+        for each in (frame[name].astype("float64") for name in (column, *rates))
+    )
+    if not rates:
+        return read_predictions(predictions.encode(), manifest=manifest)
+    document = f'{{"unit":"{RATIO}","{rates[0]}":{rest[0]},"predictions":{predictions}}}'
+    return read_predictions(document.encode(), manifest=manifest)
+
+
+def _value_column(names: list[str]) -> str:
+    values = [name for name in VALUES if name in names]
+    if len(set(values)) != 1:
+        raise KeyError(f"The frame has the columns {', '.join(names)}; expected one of {', '.join(VALUES)}.")
+    return values[0]
 
 
 def _keys(frame: pd.DataFrame) -> list[Any]:

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from evaluator.arguments import Source
-from evaluator.arrays import as_floats
+from evaluator.arrays import as_floats, whole_numbers
 from evaluator.counting import counted
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, OVERALL, Protocol, get_protocol, split_name
 from evaluator.metrics.scale import scale_ratio_to_ttc
@@ -59,10 +59,19 @@ class ScoreMetric(Metric):  # type: ignore[misc]  # of an extra, which mypy skip
         protocol: str | Protocol = DEFAULT_PROTOCOL,
         **options: Any,
     ) -> None:
-        """Raises `Rejected` as `read_truth`, `ValueError` for rows that the ground truth does not have."""
+        """Raises `Rejected` as `read_truth`; `ValueError` for rows that the ground truth does not have,
+        `TypeError` for rows that are no whole numbers, such as a mask.
+        """
         super().__init__(**options)
         whole = truth if isinstance(truth, GroundTruth) else read_truth(truth)
-        self._rows = np.arange(whole.n_sequences) if rows is None else np.unique(rows)
+        self._rows = np.arange(whole.n_sequences)
+        if rows is not None:
+            self._rows = np.unique(whole_numbers(rows, name="rows"))
+            outside = self._rows[(self._rows < 0) | (self._rows >= whole.n_sequences)]
+            if len(outside):
+                raise ValueError(
+                    f"{outside[0]} is not one of the {whole.n_sequences:,} rows of the ground truth."
+                )
         self._truth = whole if rows is None else whole.subset(self._rows)
         self._index_of = np.full(whole.n_sequences, -1)
         self._index_of[self._rows] = np.arange(len(self._rows))
@@ -81,14 +90,15 @@ class ScoreMetric(Metric):  # type: ignore[misc]  # of an extra, which mypy skip
     ) -> None:
         """Take the predictions of a batch: rows of the ground truth, and their seconds or scale ratios.
 
-        Tensors may have any precision, device and a gradient. What no file may hold is no value. Raises
-        `ValueError` for other shapes, rows that are not expected, and arguments that do not fit together.
+        Values may be tensors of any precision, device and with a gradient. What no file may hold is no value.
+        Raises `TypeError` for rows that are no whole numbers, as in `update(preds, target)`; `ValueError` for
+        other shapes, rows that are not expected or have two values, and arguments that do not fit together.
         """
         if (ttc_s is None) == (scale_ratio is None):
             raise ValueError("Give either ttc_s, or scale_ratio and frame_gap.")
         rate_hz = rate_of(is_ratio=ttc_s is None, fps_hz=None, frame_gap=frame_gap)
         values = as_floats(scale_ratio if ttc_s is None else ttc_s)
-        indices = self._indices(as_floats(rows).astype(np.int64))
+        indices = self._indices(whole_numbers(rows, name="rows"))
         if values.shape != indices.shape:
             raise ValueError(
                 f"The values are {values.shape}, the rows {indices.shape}; expected one for each."
@@ -97,6 +107,7 @@ class ScoreMetric(Metric):  # type: ignore[misc]  # of an extra, which mypy skip
             positive = np.where(allowed(values, unit="scale_ratio"), values, np.nan)
             values = scale_ratio_to_ttc(positive, fps_hz=rate_hz)
         bits = np.where(allowed(values, unit="ttc"), np.ascontiguousarray(values).view(np.int64), _NO_VALUE)
+        _require_one_value(indices.ravel(), bits.ravel())
         device = self.bits.device
         self.bits[torch.from_numpy(indices).to(device)] = torch.from_numpy(bits).to(device)
 
@@ -129,3 +140,13 @@ class ScoreMetric(Metric):  # type: ignore[misc]  # of an extra, which mypy skip
         scores = self.report.flat()
         device = self.bits.device
         return {name: torch.tensor(scores[name], dtype=torch.float32, device=device) for name in self.names}
+
+
+def _require_one_value(indices: Any, bits: Any) -> None:
+    """Raise `ValueError` where a batch has a row twice, with two values."""
+    pairs = np.unique(np.stack([indices, bits]), axis=1)
+    doubled = pairs[0][1:][pairs[0][1:] == pairs[0][:-1]]
+    if len(doubled):
+        raise ValueError(
+            f"{len(doubled):,} rows come twice in the batch, with two values; expected each once."
+        )

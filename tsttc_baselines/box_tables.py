@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evaluator.problems import Findings, listed, quoted, reject
-from evaluator.truth.csv_tables import read_text
+from evaluator.truth.csv_tables import read_text, require_one_column
 from evaluator.truth.ground_truth import Manifest
 from tsttc_baselines.clips import N_FRAMES
 
@@ -86,6 +86,7 @@ def _rows(lines: list[tuple[int, str]]) -> Iterator[tuple[int, list[str]]]:
             f"expected {','.join(COLUMNS)}."
         )
         raise reject("missing-columns", message, f"{name}, line {lines[0][0] if lines else 1}")
+    require_one_column(header, COLUMNS, where=f"{name}, line {lines[0][0]}")
     positions = [header.index(column) for column in COLUMNS]
     for number, line in lines[1:]:
         fields = line.split(",")

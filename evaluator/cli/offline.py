@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -61,6 +62,7 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
     warnings = warnings_of(parsed)
     if numbering is not None and annotations is not None:
         warnings += numbering_warnings(numbering, parsed, predictions=predictions, annotations=annotations)
+    n_infinite = sum(map(math.isinf, parsed.ttc_s.tolist()))
     if as_json:
         echo_json(
             {
@@ -68,6 +70,7 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
                 "manifest_digest": sequences.digest,
                 "n_sequences": sequences.n_sequences,
                 "n_renumbered": None if numbering is None else numbering.n_renumbered,
+                "n_infinite": n_infinite,
                 "problems": [],
                 "warnings": [asdict(warning) for warning in warnings],
             }
@@ -76,6 +79,8 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
     good = "well-formed" if warnings else "good"
     n_predicted = counted(sequences.n_sequences, "sequence")
     click.echo(f"{name_of(predictions)} is {good}: {n_predicted}, each predicted once.")
+    if n_infinite:
+        click.echo(f"{counted(n_infinite, 'value')} infinite: no growth, or an overflow; scored as ±20 s.")
     if numbering is not None:
         click.echo(numbering_in_words(numbering))
     echo_warnings(warnings)

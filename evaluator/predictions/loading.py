@@ -27,6 +27,7 @@ from evaluator.predictions.documents import Unit
 from evaluator.predictions.parquet import as_sent
 from evaluator.predictions.writing import rate_of, require_values
 from evaluator.problems import pointer, quoted, reject
+from evaluator.truth.csv_tables import require_one_column
 from evaluator.truth.ground_truth import KeyKind, Manifest
 
 
@@ -176,6 +177,8 @@ MAX_COLUMNS: Final = 1_000
 NATURAL_KEY: Final = ("bag_stamp", "cam_id", "ts", "track_id")
 VALUES: Final = {"ttc": "ttc", "ttc_s": "ttc", "scale_ratio": "scale_ratio"}
 RATES: Final = ("fps", "frame_gap")
+PREDICTED: Final = "predicted_ttc_s"
+"""In the table of `tsttc score --per-sequence`, beside the true times."""
 
 _NAMES: Final = frozenset({"anno_id", *NATURAL_KEY, *VALUES, *RATES})
 _OTHER_SEPARATORS: Final = {";": "semicolons", "\t": "tabs"}
@@ -296,6 +299,14 @@ def columns_of(header: Sequence[str]) -> tuple[Sequence[str], str, str | None]:
     if not set(keys) <= set(header) or len(values) != 1 or len(rates) != (values == ["scale_ratio"]):
         message = f"The table has the columns {quoted(','.join(header))}; {_EXPECTED}."
         raise reject("missing-columns", message, "line 1")
+    require_one_column(header, (*keys, *values, *rates), where="line 1")
+    if PREDICTED in header:
+        message = (
+            f"The table has the columns {quoted(values[0])} and {quoted(PREDICTED)}, as tsttc score "
+            "--per-sequence writes them: the true times and the predictions. Expected predictions alone: "
+            f"remove {quoted(values[0])} and rename {quoted(PREDICTED)} to ttc."
+        )
+        raise reject("bad-field", message, "line 1")
     return keys, values[0], rates[0] if rates else None
 
 

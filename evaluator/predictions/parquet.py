@@ -43,10 +43,6 @@ def _columns(schema: Any) -> tuple[list[str], list[str]]:
     keys, value, rate = columns_of(schema.names)
     values = [value] if rate is None else [value, rate]
     for name in (*keys, *values):
-        n_columns = schema.names.count(name)
-        if n_columns > 1:
-            message = f"The table has {n_columns} columns {quoted(name)}; expected one."
-            raise reject("bad-field", message, f"column {name}")
         column_type = schema.field(name).type
         if not _is_fitting(column_type, is_key=name in keys):
             expected = "integers or text" if name in keys else "integers or floats"

@@ -11,7 +11,7 @@ import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -141,6 +141,16 @@ def read_text(source: Source) -> str:
         raise reject("not-utf8", f"Byte {error.start:,} is not UTF-8.", where) from None
 
 
+def require_one_column(header: Sequence[str], columns: Iterable[str], *, where: str) -> None:
+    """Raise `Rejected` if the header has one of these columns twice: nothing says which one is meant."""
+    for name in columns:
+        n_columns = list(header).count(name)
+        if n_columns > 1:
+            raise reject(
+                "bad-field", f"The table has {n_columns} columns {quoted(name)}; expected one.", where
+            )
+
+
 def read_csv(source: Source, *, with_ttc: bool) -> Table:
     """Read a CSV table; raises `Rejected`, by line, for missing columns and malformed fields."""
     # `COLUMNS` and `unit`, for a ground truth also `OBJECT_COLUMNS`; other columns are ignored.
@@ -164,6 +174,7 @@ def _read_rows(rows: Any, columns: tuple[str, ...]) -> Table:
             "line 1",
         )
     columns = (*columns, UNIT) if UNIT in header else columns
+    require_one_column(header, (*columns, *(OBJECT_COLUMNS if "ttc" in columns else ())), where="line 1")
     positions = {name: header.index(name) for name in columns}
     extra = {name: header.index(name) for name in OBJECT_COLUMNS if name in header and "ttc" in columns}
     table, findings, locations = Table(), Findings(), []

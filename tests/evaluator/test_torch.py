@@ -4,7 +4,9 @@ import copy
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -111,6 +113,36 @@ def test_wrong_arguments_are_named(truth: GroundTruth, arguments: tuple, options
         ScoreMetric(truth).update(*arguments, **options)
     with pytest.raises(Rejected):
         ScoreMetric(EXAMPLES / "manifest.csv")
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        lambda: torch.tensor([4.0, 13.94]),
+        lambda: torch.tensor([4.0, 13.0], dtype=torch.bfloat16),
+        lambda: torch.tensor([True, False]),
+        lambda: np.array([4.0, 13.94]),
+        lambda: [torch.tensor(4.0), torch.tensor(13.94)],
+    ],
+)
+def test_predictions_in_the_place_of_rows_are_refused(truth: GroundTruth, rows: Callable[[], Any]) -> None:
+    with pytest.raises(TypeError, match="expected whole numbers"):
+        ScoreMetric(truth).update(rows(), [4.0, 14.0])
+    with pytest.raises(TypeError, match="expected whole numbers"):
+        ScoreMetric(truth, rows=rows())
+
+
+def test_rows_that_are_not_there_or_have_two_values_are_refused(truth: GroundTruth) -> None:
+    metric = ScoreMetric(truth)
+    for rows in ([-1, 2], [0, 60], torch.tensor([3, -60])):
+        with pytest.raises(ValueError, match="is not one of the 60 rows"):
+            metric.update(rows, [1.0, 2.0])
+        with pytest.raises(ValueError, match="is not one of the 60 rows"):
+            ScoreMetric(truth, rows=rows)
+    with pytest.raises(ValueError, match="1 rows come twice in the batch, with two values"):
+        metric.update([3, 4, 3], [1.0, 2.0, 1.5])
+    metric.update([torch.tensor(3), torch.tensor(4), torch.tensor(3)], [1.0, 2.0, 1.0])
+    metric.update([], [])
 
 
 def test_a_metric_can_be_copied_and_saved_with_its_module(truth: GroundTruth, tmp_path: Path) -> None:

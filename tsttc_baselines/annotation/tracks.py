@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from evaluator.metrics.scale import Floats
 from evaluator.problems import Findings, quoted, reject
-from evaluator.truth.csv_tables import name_fault, read_text
+from evaluator.truth.csv_tables import name_fault, read_text, require_one_column
 
 NAMES: Final = ("bag_stamp", "cam_id", "track_id")
 BODY: Final = ("x", "y", "z", "length", "width", "height", "yaw")
@@ -168,6 +168,7 @@ def _read_rows(rows: Iterator[list[str]], header: list[str]) -> Tracks:
             f"expected {','.join(COLUMNS)}."
         )
         raise reject("missing-columns", message, "line 1")
+    require_one_column(header, (*COLUMNS, RADAR), where="line 1")
     has_radar = RADAR in header
     positions = [header.index(name) for name in (*COLUMNS, *([RADAR] if has_radar else []))]
     collected = Collected()
