@@ -26,7 +26,7 @@ def as_floats(values: Any) -> Floats:
     if array.dtype.kind in "cmM":
         raise TypeError(f"The values are of type {array.dtype}; expected real numbers.")
     if isinstance(array, np.ma.MaskedArray):
-        return np.asarray(array.astype(np.float64).filled(np.nan))
+        return np.asarray(np.ma.filled(array.astype(np.float64), np.nan))
     return np.asarray(array, dtype=np.float64)
 
 

@@ -227,10 +227,33 @@ def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> fro
         predictions = read_predictions(data, manifest=manifest)
     except Rejected as fault:
         hint = "This file was not submitted and did not count against your quota."
-        raise rejected(name_of(path), fault, hint=hint) from None
+        worded = _explained(client, data, fault, split=split, current=manifest.digest)
+        raise rejected(name_of(path), worded, hint=hint) from None
     warnings = warnings_of(predictions)
     echo_warnings(warnings)
     return frozenset(warning.code for warning in warnings)
+
+
+def _explained(client: Client, data: bytes, fault: Rejected, *, split: str, current: str) -> Rejected:
+    """Say of a file with other keys which earlier edition it fits, as the server does."""
+    from evaluator import read_manifest, read_predictions  # noqa: PLC0415 -- loads numpy
+    from evaluator.client.answers import ClientError  # noqa: PLC0415 -- loads msgspec
+    from evaluator.predictions import former  # noqa: PLC0415 -- loads numpy
+
+    if not former.is_of_keys(fault):
+        return fault
+    try:
+        numbers = {digest: number for number, digest in sorted(client.editions(split)) if digest != current}
+        for number in sorted(numbers.values(), reverse=True)[: former.MAX_MANIFESTS]:
+            manifest = read_manifest(client.manifest(split, edition=number))
+            try:
+                keys = read_predictions(data, manifest=manifest).keys
+            except Rejected:
+                continue
+            return former.explained(fault, split=split, edition=number, keys=keys)
+    except (ClientError, Rejected):
+        return fault  # the problem is known without the editions
+    return fault
 
 
 def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submission:

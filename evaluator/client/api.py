@@ -190,6 +190,12 @@ class Client:
         query = {} if edition is None else {"edition": edition}
         return self._asked_by_anybody("splits", split, "manifest", accept="text/csv, */*", **query).content
 
+    def editions(self, split: str) -> list[tuple[int, str]]:
+        """List the published editions of a split: their numbers, and the digests of their manifests."""
+        response = self._asked_by_anybody("splits", split, "editions", accept="application/json")
+        listed = [(row.get("edition"), row.get("manifest")) for row in rows(response, JSON)]
+        return [(number, str(digest)) for number, digest in listed if isinstance(number, int)]
+
     def quota(self) -> list[Quota]:
         """Fetch your team's remaining submissions, by split."""
         return rows(self._asked("quota"), Quota)

@@ -244,7 +244,7 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> RunRes
         predictions = file_values.read(file, edition, heartbeat=heartbeat)
         report = scorer.report(predictions, keep_bags=True)
     except Rejected as rejected:
-        return rejection(former_keys.explained(rejected, file=file, edition=edition))
+        return rejection(former_keys.explained(rejected, file=file, edition=edition, heartbeat=heartbeat))
     recording_sums.save(edition, file=file, bags=report.bags)
     return scored(report, decimals=edition.decimals, warnings=warnings_of(predictions))
 

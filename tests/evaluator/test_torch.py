@@ -125,7 +125,7 @@ def test_wrong_arguments_are_named(truth: GroundTruth, arguments: tuple, options
         lambda: [torch.tensor(4.0), torch.tensor(13.94)],
     ],
 )
-def test_predictions_in_the_place_of_rows_are_refused(truth: GroundTruth, rows: Callable[[], Any]) -> None:
+def test_predictions_instead_of_rows_are_refused(truth: GroundTruth, rows: Callable[[], Any]) -> None:
     with pytest.raises(TypeError, match="expected whole numbers"):
         ScoreMetric(truth).update(rows(), [4.0, 14.0])
     with pytest.raises(TypeError, match="expected whole numbers"):

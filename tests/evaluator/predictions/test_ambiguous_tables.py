@@ -1,6 +1,7 @@
 """Tables that say two things are refused, wherever they are read."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -85,7 +86,7 @@ def test_two_columns_of_one_name_are_no_frame() -> None:
     for name in ("ttc", "track_id"):
         twice = pd.concat([frame, frame[[name]]], axis=1)
         expected = ("bad-field", f'The table has 2 columns "{name}"; expected one.')
-        assert problem(lambda twice=twice: predictions_from_frame(twice, manifest=MANIFEST)) == expected
+        assert problem(partial(predictions_from_frame, twice, manifest=MANIFEST)) == expected
 
 
 def test_the_table_of_score_is_no_prediction_file(tsttc: Tsttc, tmp_path: Path) -> None:

@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 from evaluator import GroundTruth, Rejected, evaluate, read_predictions, write_predictions
+from evaluator.predictions import former
 from evaluator.predictions.conversion import convert
+from tests.evaluator.cli.recorded_site import RecordedSite, Reply
 from tests.evaluator.worlds import Tsttc, envelope, flat, make_truth
 
 
@@ -86,3 +88,22 @@ def test_the_command_repairs_a_file_of_an_earlier_edition(tsttc: Tsttc, tmp_path
     assert tsttc("check", mine, "--manifest", new).exit_code == 0
     both = tsttc("convert", tmp_path / "sent.json", "--manifest", old, "--annotations", tmp_path)
     assert (both.exit_code, "Give either --annotations or --manifest" in both.stderr) == (2, True)
+
+
+def test_submit_says_which_edition_a_file_fits_in_the_words_of_the_server(
+    tsttc: Tsttc, site: RecordedSite, at_site: None, tmp_path: Path
+) -> None:
+    def csv(truth: GroundTruth) -> Reply:
+        return Reply(truth.manifest.to_csv(), headers={"Content-Type": "text/csv"})
+
+    editions = [
+        {"edition": number, "manifest": truth.manifest.digest} for number, truth in ((1, FIRST), (2, SECOND))
+    ]
+    site.put("GET /api/v1/splits/val/editions", Reply(editions))
+    site.put("GET /api/v1/splits/val/manifest", csv(SECOND), csv(FIRST))
+    mine = tmp_path / "mine.json"
+    mine.write_bytes(BY_NUMBER)
+    refused = tsttc("submit", mine, "--split", "val", "--method", "Foo++")
+    assert refused.exit_code == 1
+    assert former.advice(split="val", edition=1, keys="anno_id") in refused.stderr
+    assert site.posts == []

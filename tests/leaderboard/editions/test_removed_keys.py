@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from evaluator.predictions import former
 from leaderboard.models import Edition, Status, User
 from leaderboard.storage import truth_values
 from tests import builders
@@ -62,3 +63,32 @@ def test_keys_of_a_draft_are_unknown_and_nothing_more(edition: Edition, owner: U
     open_edition(extended(tmp_path))
     sent = by_natural_key(edition) | {"0001/9/700000000/1": 3.5}
     assert "edition" not in problem_of(owner, sent)
+
+
+def by_anno_id(edition: Edition) -> dict[str, float]:
+    truth = truth_values.load(edition.ground_truth_id)
+    return dict(zip(truth.manifest.anno_id_keys, truth.ttc_s.tolist(), strict=True))
+
+
+def test_a_file_that_fits_an_earlier_edition_gets_the_command_that_repairs_it(
+    edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    builders.import_truth(tmp_path, split="val", seed=3)
+    numbered, natural = by_anno_id(edition), by_natural_key(edition)
+    publish(open_edition(corrected(tmp_path, factor=1.3)))
+    publish(open_edition(corrected(tmp_path, drop="0002")), replaces=2)
+    # Edition 2 has the manifest of edition 1: the later one is named.
+    assert former.advice(split="test", edition=2, keys="anno_id") in problem_of(owner, numbered)
+    assert former.advice(split="test", edition=2, keys="natural_key") in problem_of(owner, natural)
+    assert former.advice(split="test", edition=2, keys="natural_key") in problem_of(owner, csv(natural))
+    # What the natural repair of the keys would make of it fits no edition, and neither does a faulty file.
+    assert "fits the manifest" not in problem_of(owner, dict(list(numbered.items())[:-1]))
+    assert "fits the manifest" not in problem_of(owner, numbered | {"0": 0.0})
+
+
+def test_a_file_that_lacks_the_sequences_of_a_new_edition_gets_it_too(
+    edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    numbered = by_anno_id(edition)
+    publish(open_edition(extended(tmp_path)), leave_out=True)
+    assert former.advice(split="test", edition=1, keys="anno_id") in problem_of(owner, numbered)
