@@ -35,8 +35,8 @@ def origin_of(record: logging.LogRecord) -> str:
         return f"{type(fault).__qualname__} {raised_at}"
     # A probe that fails is a fault of its own; elsewhere visitors choose the address.
     address = str(event.get("request", "")).partition(" ")[2]
-    told = [str(event.get(name, "")) for name in _TELLING]
-    return " ".join([f"{record.name}:{record.lineno}", *told, address if address in MONITORED else ""])
+    values = [str(event.get(name, "")) for name in _TELLING]
+    return " ".join([f"{record.name}:{record.lineno}", *values, address if address in MONITORED else ""])
 
 
 def _exception(exc_info: Any) -> BaseException | None:
@@ -44,7 +44,7 @@ def _exception(exc_info: Any) -> BaseException | None:
     if isinstance(exc_info, BaseException):
         return exc_info
     if isinstance(exc_info, tuple):
-        return exc_info[1]  # type: ignore[no-any-return]  # of logging's own form
+        return exc_info[1]
     return sys.exception() if exc_info else None
 
 

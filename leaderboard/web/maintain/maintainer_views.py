@@ -14,6 +14,7 @@ from django.views.decorators.http import require_safe
 from django_htmx.http import HttpResponseClientRefresh
 
 from evaluator.tables.formats import csv_lines
+from leaderboard.db import clock
 from leaderboard.editions import corrections, history, preview, splits
 from leaderboard.editions.preview import ABSENT
 from leaderboard.errors.refusals import NotMaintainer
@@ -23,7 +24,7 @@ from leaderboard.pages import texts
 from leaderboard.web.boards import edition_tables, tables
 from leaderboard.web.decorators import asks_first
 from leaderboard.web.forms import SiteForm
-from leaderboard.web.maintain import preview_tables, queue_tables
+from leaderboard.web.maintain import preview_tables, queue_tables, site_state
 from leaderboard.web.maintain.maintainer_forms import (
     DiscardForm,
     OpenForm,
@@ -85,6 +86,7 @@ def hub(request: HttpRequest) -> HttpResponse:
         "n_mails_unsent": outbox.unsent().count(),
         "n_events": AuditEvent.objects.count(),
         "has_imprint": has_imprint,
+        "state": site_state.lines(now=clock.database_now()),
     }
     return render(request, "maintain/hub.html", context)
 
