@@ -1,6 +1,6 @@
 """The splits and the published results that the benchmark has from the start."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -17,8 +17,9 @@ from leaderboard import audit, board_versions
 from leaderboard.editions import papers
 from leaderboard.editions.policy import HIDDEN_QUOTA
 from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
-from leaderboard.models import PublishedResult, Split, User
+from leaderboard.models import Method, PublishedResult, Split, User, Visibility
 from leaderboard.models.benchmark import SINCE_EVER
+from leaderboard.people.names import confusable_with
 
 PUBLISHED_DIR = Path(__file__).parent / "published"
 MAX_REASON: Final = 500
@@ -88,6 +89,7 @@ def import_published(
             outcome = _import_row(row, now=now, is_replacing=is_replacing)
             names_by_outcome[outcome].append(f"{row['split_id']}/{row['slug']}")
         split_ids = sorted({row["split_id"] for row in rows})
+        _require_names_of_their_own(rows, outcomes=names_by_outcome)
         if names_by_outcome["added"] or names_by_outcome["replaced"]:
             audit.record(
                 verb="imported",
@@ -137,6 +139,30 @@ def quoted() -> QuerySet[PublishedResult]:
     """Return the published results on the boards now, by split, newest first."""
     rows = PublishedResult.objects.filter(replaced_at=None).select_related("split")
     return rows.order_by("split__position", "split", "-added_at", "pk")
+
+
+def _require_names_of_their_own(
+    rows: Iterable[Mapping[str, Any]], *, outcomes: Mapping[str, Sequence[str]]
+) -> None:
+    """Raise `Refused` for a new row whose name looks like another one on its board."""
+    new = [row for row in rows if f"{row['split_id']}/{row['slug']}" not in outcomes["unchanged"]]
+    if not new:
+        return
+    # Whoever shows a name holds this until it is shown. The rows are written: whoever comes later sees them.
+    board_versions.lock()
+    public = Method.objects.filter(visibility=Visibility.PUBLIC).values_list("name", flat=True)
+    current = PublishedResult.objects.filter(replaced_at=None)
+    for row in new:
+        others = current.filter(split=row["split_id"]).exclude(slug=row["slug"])
+        name = row["method_name"]
+        twin = confusable_with(name, [*public, *others.values_list("method_name", flat=True)])
+        if twin is not None:
+            raise Refused(
+                "name-taken",
+                f"The row {row['slug']!r} of the board of {row['split_id']} has the name {name!r}, which "
+                f"looks like {twin!r} there; expected another name, such as one with the year of the paper.",
+                field="file",
+            )
 
 
 def _import_row(row: Mapping[str, Any], *, now: datetime, is_replacing: bool) -> str:

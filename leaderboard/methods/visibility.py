@@ -16,8 +16,8 @@ from django.db import transaction
 from leaderboard import audit, board_versions
 from leaderboard.errors.refusals import Refused
 from leaderboard.methods.editing import require_team
-from leaderboard.models import Method, PublishedResult, Team, User, Visibility
-from leaderboard.people import teams
+from leaderboard.models import Method, Team, User, Visibility
+from leaderboard.people import public_names, teams
 from leaderboard.people.names import confusable_with, numbered
 
 log = structlog.get_logger(__name__)
@@ -48,10 +48,16 @@ def change(
         row.visibility, row.reveal_at = visibility, reveal_at
         if before == {"visibility": row.visibility, "reveal_at": row.reveal_at}:
             return row
+        row.shown_at = row.shown_at or now
+        fields = ["visibility", "reveal_at", "shown_at"]
         if visibility == Visibility.PUBLIC:
             teams.show_name(row.team)
-        row.shown_at = row.shown_at or now
-        row.save(update_fields=["visibility", "reveal_at", "shown_at"])
+            # Whoever shows a name holds this until it is shown: of two that look alike, one is refused.
+            board_versions.lock()
+            public_names.require_free(row.name, but=row, field="visibility")
+            public_names.save(row, fields=fields)
+        else:
+            row.save(update_fields=fields)
         audit.record_of(
             row,
             "shown",
@@ -81,7 +87,7 @@ def require_possible(method: Method, *, visibility: str, reveal_at: datetime | N
         )
     if visibility == Visibility.PUBLIC:
         teams.require_showable(method.team)
-        _require_name_of_its_own(method)
+        public_names.require_free(method.name, but=method, field="visibility")
     if reveal_at is None:
         return
     if visibility != Visibility.ANONYMOUS:
@@ -123,6 +129,7 @@ def reveal_due(*, now: datetime) -> int:
                 continue
             # Read only now: the method may have moved to another team until it was locked.
             teams.show_name_in_any_case(Team.objects.get(methods=method_id))
+            board_versions.lock()
             _number_taken_name(Method.objects.get(pk=method_id))
             details: Mapping[str, str] = {"from": Visibility.ANONYMOUS, "to": Visibility.PUBLIC}
             audit.record(verb="revealed", noun="Method", noun_id=method_id, details=details)
@@ -131,33 +138,16 @@ def reveal_due(*, now: datetime) -> int:
     return n_revealed
 
 
-def _require_name_of_its_own(method: Method) -> None:
-    twin = _public_twin(method.name, but=method)
-    if twin is not None:
-        raise Refused(
-            "name-taken",
-            f"The boards already have a method {twin!r}, and {method.name!r} looks like it; expected another "
-            "name. Rename your method before you publish it.",
-            field="visibility",
-        )
-
-
 def _number_taken_name(method: Method) -> None:
     before = method.name
     own = Method.objects.existing().filter(team=method.team_id).exclude(pk=method.pk)
     names_of_team = list(own.values_list("name", flat=True))
     method.name = numbered(
         before,
-        is_taken=lambda name: _public_twin(name, but=method) or confusable_with(name, names_of_team),
+        is_taken=lambda name: public_names.twin_of(name, but=method) or confusable_with(name, names_of_team),
     )
+    public_names.save(method, fields=["name"])
     if method.name != before:
-        method.save(update_fields=["name"])
         details = {"reason": "another method used this name on the boards first"}
         names = {"from": before, "to": method.name}
         audit.record_of(method, "renamed", details=details, names=names)
-
-
-def _public_twin(name: str, *, but: Method) -> str | None:
-    quoted = PublishedResult.objects.filter(replaced_at=None).values_list("method_name", flat=True)
-    public = Method.objects.filter(visibility=Visibility.PUBLIC).exclude(pk=but.pk)
-    return confusable_with(name, [*quoted, *public.values_list("name", flat=True)])

@@ -69,6 +69,10 @@ class Method(models.Model):
     id = models.UUIDField(primary_key=True, default=uuid.uuid4, editable=False)
     team = models.ForeignKey(Team, on_delete=models.PROTECT, related_name="methods")
     name = models.CharField(max_length=80)
+    # What the name of a public method looks like: no two of them have one look. None while it is not public.
+    look = models.CharField(  # noqa: DJ001 - unique, and an empty text is one
+        max_length=360, null=True, unique=True, editable=False
+    )
     description = models.TextField(blank=True, max_length=2000)
     paper_url = models.URLField(blank=True, max_length=500)
     code_url = models.URLField(blank=True, max_length=500)

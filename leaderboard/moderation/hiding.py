@@ -10,7 +10,7 @@ from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
 from leaderboard.methods import editing
 from leaderboard.models import Method, Submission, Team, User, Visibility
 from leaderboard.models.methods import MethodQuerySet
-from leaderboard.people import teams
+from leaderboard.people import public_names, teams
 from leaderboard.people.names import clean_name
 from leaderboard.queue import lifecycle
 
@@ -42,7 +42,12 @@ def rename_method(*, method: Method, name: str, reason: str, actor: User | None,
         name = clean_name("name", name or masked("Method", row.pk))
         editing.require_distinct_name(name, team=row.team, field="name", but=row)
         before, row.name, row.renamed_at = row.name, name, now
-        row.save(update_fields=["name", "renamed_at"])
+        if row.visibility == Visibility.PUBLIC:
+            board_versions.lock()
+            public_names.require_free(name, but=row, field="name")
+            public_names.save(row, fields=["name", "renamed_at"])
+        else:
+            row.save(update_fields=["name", "renamed_at"])
         audit.record_of(
             row, "renamed", actor=actor, details={"reason": reason}, names={"from": before, "to": name}
         )

@@ -14,8 +14,8 @@ from django.urls import reverse
 from leaderboard import audit, board_versions
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Invitation, Membership, Method, Team, User, Visibility
-from leaderboard.people import accounts, teams
-from leaderboard.people.names import confusable_with, numbered
+from leaderboard.people import accounts, public_names, teams
+from leaderboard.people.names import confusable_with, numbered, skeleton
 
 LIFETIME = timedelta(days=7)
 MAX_OPEN = 20
@@ -219,9 +219,26 @@ def _bring_methods(former: Team, team: Team) -> dict[str, str]:
     names = _names_there([method.name for method in methods if method.deleted_at is None], there)
     # A deleted one comes along with its files, and takes no name.
     moved = {method: method.name if method.deleted_at else names[method.name] for method in methods}
+    public = [method for method in methods if method.visibility == Visibility.PUBLIC]
+    renamed = [method for method in public if moved[method] != method.name]
+    if renamed:
+        board_versions.lock()
+    for method in renamed:
+        others = [*there, *(name for other, name in moved.items() if other != method)]
+        moved[method] = _public_name(method, others)
     for method, name in moved.items():
-        Method.objects.filter(pk=method.pk).update(team=team, name=name)
+        look = skeleton(name) if method in renamed else method.look
+        Method.objects.filter(pk=method.pk).update(team=team, name=name, look=look)
     return {str(method.pk): name for method, name in moved.items()}
+
+
+def _public_name(method: Method, others: Iterable[str]) -> str:
+    taken = list(others)
+
+    def is_taken(name: str) -> object:
+        return public_names.twin_of(name, but=method) or confusable_with(name, taken)
+
+    return numbered(method.name, is_taken=is_taken)
 
 
 def _names_there(names: Iterable[str], taken: Iterable[str]) -> dict[str, str]:

@@ -4,6 +4,7 @@ import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime, timedelta
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 from django.conf import settings
@@ -15,7 +16,7 @@ MAX_LOOK = 320
 RESERVED = "Anonymous"
 
 # Letters that differ by case or by name alone, and pairs that read as one letter.
-_ONE_LOOK = str.maketrans({"i": "l", "1": "l", "|": "l", "0": "o", "m": "rn", "w": "vv", "`": "'", '"': "''"})
+_ONE_LOOK = str.maketrans({"i": "l", "1": "l", "|": "l", "0": "o", "m": "rn", "w": "vv"})
 # Characters without ink that are no spaces or controls by their category.
 _WITHOUT_INK = frozenset(
     [
@@ -26,16 +27,36 @@ _WITHOUT_INK = frozenset(
     ]
 )
 _MAX_MARKS = 2
+# What stands around and between words beside punctuation; "<" and ">" look like brackets.
+_SEPARATORS = frozenset("<>~´¨")
 
 
 def skeleton(name: str) -> str:
-    """Return a key of at most `MAX_LOOK` characters; names with equal keys look alike.
+    """Return a key of at most `MAX_LOOK` characters, none of them a space; names with equal keys look alike.
 
-    >>> skeleton("Foo  Lab") == skeleton("ｆｏｏ lab") == skeleton("Fоο Lаb")
+    Spaces and punctuation count between two digits alone, where any of them is a full stop.
+
+    >>> skeleton("Foo  Lab") == skeleton("ｆｏｏ-lab") == skeleton("(Fоο Lаb)")
     True
+    >>> skeleton("Foo 1.2") == skeleton("Foo 1-2"), skeleton("Foo 1.2") == skeleton("Foo 12")
+    (True, False)
     """
-    folded = "".join(_folded(character) for character in unicodedata.normalize("NFKD", name))
-    return " ".join(folded.casefold().translate(_ONE_LOOK).split())[:MAX_LOOK]
+    folded = "".join(_folded(character) for character in unicodedata.normalize("NFKD", name)).casefold()
+    return _without_separators(folded).translate(_ONE_LOOK)[:MAX_LOOK]
+
+
+def _without_separators(text: str) -> str:
+    spaced = "".join(" " if _separates(character) else character for character in text)
+    parts = spaced.split()
+    kept = parts[:1]
+    for before, part in pairwise(parts):
+        kept += [".", part] if before[-1].isdigit() and part[0].isdigit() else [part]
+    return "".join(kept)
+
+
+def _separates(character: str) -> bool:
+    category = unicodedata.category(character)
+    return character != "|" and (character in _SEPARATORS or category[0] in "PZ" or category == "Sk")
 
 
 def clean_name(field: str, text: str) -> str:
@@ -56,11 +77,11 @@ def clean_name(field: str, text: str) -> str:
         raise Refused(
             "bad-name", f"The name in '{field}' is {text!r}; expected a letter or a digit in it.", field=field
         )
-    if skeleton(text).startswith(skeleton(RESERVED)):
+    if skeleton(RESERVED) in skeleton(text):
         raise Refused(
             "reserved-name",
-            f"The name in '{field}' looks like {RESERVED!r}, which is reserved for methods without a name; "
-            "expected another name.",
+            f"The name in '{field}' looks as if it had the word {RESERVED!r}, which is reserved for methods "
+            "without a name; expected another name.",
             field=field,
         )
     return text

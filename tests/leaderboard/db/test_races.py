@@ -165,6 +165,30 @@ def test_of_teams_that_look_alike_one_alone_is_shown_at_once(db: None) -> None:
     assert Team.objects.filter(is_shown=True).count() == 1
 
 
+def test_of_methods_that_look_alike_one_alone_is_shown_at_once(db: None) -> None:
+    people = [User.objects.create_user(f"{i}@example.org") for i in range(8)]
+    methods = [
+        Method.objects.create(
+            team=teams.create(user=user, name=f"Team number {number}", now=FIRST_DAY),
+            name=["Owl Net", "0wl-Net", "ΟWL NET.", "(owl net)"][number % 4],
+            created_at=FIRST_DAY,
+        )
+        for number, user in enumerate(people)
+    ]
+
+    def show(number: int) -> bool:
+        try:
+            visibility.change(
+                method=methods[number], visibility=Visibility.PUBLIC, actor=people[number], now=FIRST_DAY
+            )
+        except Refused:
+            return False
+        return True
+
+    assert sum(at_once(8, show)) == 1
+    assert Method.objects.filter(visibility=Visibility.PUBLIC).count() == 1
+
+
 def test_methods_that_look_alike_at_once_are_one(edition: Edition, owner: User) -> None:
     teams.team_of(user=owner)
     data = [builders.predictions(edition, factor=1 + number / 100) for number in range(12)]
