@@ -185,7 +185,7 @@ def test_an_override_has_the_labels_of_its_form_and_its_reason_comes_last(
     assert details.endswith("; reason: A deadline.")
 
 
-def test_equal_names_are_told_apart_by_their_teams(
+def test_equal_names_have_the_names_of_their_teams(
     keeper: Client, edition: Edition, owner: User, stranger: User
 ) -> None:
     for user in (owner, stranger):
@@ -220,9 +220,7 @@ def test_actions_of_people_are_shown_and_exported_without_those_of_machines(
 
 
 @pytest.mark.parametrize("address", [PAGE, "/maintain/teams/", "/maintain/queue/"])
-def test_a_filter_that_a_page_does_not_have_is_said_not_to_apply(
-    keeper: Client, trail: None, address: str
-) -> None:
+def test_a_page_names_the_filters_that_it_does_not_have(keeper: Client, trail: None, address: str) -> None:
     answer = assert_sound(keeper.get(f"{address}?q=owls&page=1&<b>=2"))
     assert "Not applied: “q”, “<b>”. This page has no such filter." in answer.one("main").text
     assert "Not applied" not in assert_sound(keeper.get(f"{address}?page=1")).one("main").text
