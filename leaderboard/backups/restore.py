@@ -12,6 +12,7 @@ from django.core.files.base import File
 from leaderboard import audit
 from leaderboard.backups import contents, database
 from leaderboard.backups.contents import Contents, NoBackup
+from leaderboard.models import BackupRun
 from leaderboard.storage import files, ownership
 from leaderboard.submissions import receipts
 
@@ -53,6 +54,8 @@ def restore(*, source: str, now: datetime) -> Restored:
     site = ownership.note_restore(now=now)
     # Who has signed out since, or has another password now, is not let in by what the browser kept.
     Session.objects.all().delete()
+    # The run that made the backup had not ended yet; else it would count as one that was killed.
+    BackupRun.objects.filter(finished_at=None).delete()
     store_is_of = ownership.take_if_new(site, is_new=is_new_store)
     return Restored(kept, store_is_of, ownership.kept_until(now), _verified_boards(kept), _keys_away(kept))
 

@@ -122,7 +122,7 @@ def test_a_file_that_was_mended_replaces_what_the_backup_has(sent: list[Submissi
     made = make(folder)
     assert made.faults == {}
     assert copied(folder, sent[0]).read_bytes() == good
-    assert backup_runs.last_failed() is None
+    assert not backup_runs.failed_since_good(now=timezone.now()).exists()
 
 
 def test_a_damaged_copy_is_noticed_and_replaced(sent: list[Submission], folder: Path) -> None:
@@ -266,8 +266,7 @@ def test_a_backup_that_cannot_be_made_is_recorded_with_its_reason(db: None, tmp_
     (tmp_path / "file").write_text("")
     with pytest.raises(CommandError, match="is a file; expected a folder"):
         call_command("backup", str(tmp_path / "file"))
-    failed = backup_runs.last_failed()
-    assert failed is not None
+    [failed] = backup_runs.failed_since_good(now=timezone.now())
     assert "is a file" in failed.fault
 
 
