@@ -18,6 +18,8 @@ from django.utils import timezone
 
 MONITORED: Final = frozenset({"/healthz", "/readyz", "/healthy", "/metrics"})
 _HOUR: Final = "%Y%m%d%H"
+# Django logs there that it refuses a request, such as one with a wrong Host: no fault of the site.
+_OF_VISITORS: Final = "django.security."
 _MAX_CHARACTERS: Final = 20_000
 
 
@@ -52,6 +54,8 @@ class FaultReportHandler(logging.Handler):
     """Puts a line of the log into the outbox. A fault there never raises another."""
 
     def emit(self, record: logging.LogRecord) -> None:
+        if record.name.startswith(_OF_VISITORS):
+            return
         try:
             self._queue(self.format(record), origin=origin_of(record), now=timezone.now())
         except Exception:  # noqa: BLE001 - logging's own rule: whatever fails, the caller goes on

@@ -102,8 +102,6 @@ def logging_settings(*, as_json: bool, level: str, has_reports: bool = False) ->
         "loggers": {
             # Their own handlers would say everything twice.
             "django": {"handlers": [], "level": level, "propagate": True},
-            # Told by requests that are refused, such as one with a wrong Host: no fault of ours, and no mail.
-            "django.security": {"handlers": ["stderr"], "level": level, "propagate": False},
             "django.server": {"handlers": [], "level": level, "propagate": True},
             "gunicorn.error": {"handlers": [], "level": level, "propagate": True},
             # The request's and the task's own lines have it all, with their ids.
