@@ -45,6 +45,10 @@ def shown_split(name: str) -> Split:
     return splits[name]
 
 
+# They change the order in which everything after them is read, beyond the end of the text.
+_BIDI_CONTROLS = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+
+
 def clean_text(name: str, text: str, *, limit: int, required: bool = True) -> str:
     """Strip a text. Raises `Refused` for control characters, excess or absence."""
     text = text.strip()
@@ -59,7 +63,8 @@ def clean_text(name: str, text: str, *, limit: int, required: bool = True) -> st
             field=name,
         )
     for character in text:
-        if unicodedata.category(character) in {"Cc", "Cs", "Co", "Cn"} and character not in "\r\n\t":
+        is_control = unicodedata.category(character) in {"Cc", "Cs", "Co", "Cn"}
+        if (is_control and character not in "\r\n\t") or character in _BIDI_CONTROLS:
             raise Refused(
                 "bad-character",
                 f"The field '{name}' has the character U+{ord(character):04X}; expected printable text.",

@@ -6,6 +6,7 @@ from uuid import UUID
 
 from evaluator.metrics.registry import RTE
 from leaderboard.boards.rows import Entry
+from leaderboard.models import Visibility
 
 SPEEDS_KMH: Final = (30, 50, 80, 120)
 START_KMH: Final = 80
@@ -40,12 +41,15 @@ class Lens(NamedTuple):
 def contact_lens(entries: Sequence[Entry], curves: Mapping[UUID, Curve]) -> Lens | None:
     """Return the lens of the entries that have a curve, by their evaluation; None where fewer than two have.
 
+    A row of somebody else without a name has none here: a curve tells more of its network than its scores do.
     A mean relative error of a bin times the middle of the bin is its error in seconds.
     """
     drawn = [
         (entry, curve)
         for entry in entries
-        if entry.evaluation_id and (curve := curves.get(entry.evaluation_id)) is not None
+        if entry.evaluation_id
+        and (entry.is_mine or entry.visibility != Visibility.ANONYMOUS)
+        and (curve := curves.get(entry.evaluation_id)) is not None
     ]
     by_bin = [
         {

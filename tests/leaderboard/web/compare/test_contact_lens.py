@@ -3,7 +3,7 @@
 import pytest
 from django.test import Client
 
-from leaderboard.models import Split, Submission
+from leaderboard.models import Method, Split, Submission, User
 from tests import builders, pages
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("open_values")]
@@ -39,3 +39,13 @@ def test_hidden_splits_have_no_lens(client: Client, entries: list[Submission]) -
     Split.objects.filter(pk="test").update(is_hidden=True)
     builders.board_changed("test")
     assert lens_rows(client, entries) == []
+
+
+def test_a_row_of_somebody_else_without_a_name_has_no_lens(
+    client: Client, entries: list[Submission], owner: User
+) -> None:
+    Method.objects.filter(pk=entries[0].method_id).update(visibility="ANONYMOUS")
+    builders.board_changed("test")
+    assert lens_rows(client, entries) == []
+    client.force_login(owner)
+    assert lens_rows(client, entries)
