@@ -192,7 +192,7 @@ def test_postgresql_allows_a_whole_seal_and_nothing_beside_it(db: None, seal: st
 
 
 @POSTGRESQL_ONLY
-def test_an_event_of_somebody_else_breaks_neither_the_chain_nor_the_sealing(db: None) -> None:
+def test_an_inserted_event_breaks_neither_the_chain_nor_the_sealing(db: None) -> None:
     sealed(2)
     columns = "(at, verb, noun, noun_id, details"
     event = "('1999-01-01', 'v', 'n', '1'"

@@ -41,7 +41,7 @@ def test_hidden_splits_have_no_lens(client: Client, entries: list[Submission]) -
     assert lens_rows(client, entries) == []
 
 
-def test_a_row_of_somebody_else_without_a_name_has_no_lens(
+def test_an_anonymous_row_of_another_team_has_no_lens(
     client: Client, entries: list[Submission], owner: User
 ) -> None:
     Method.objects.filter(pk=entries[0].method_id).update(visibility="ANONYMOUS")
