@@ -8,7 +8,7 @@ from typing import Any, Final
 import pandas as pd
 
 from evaluator.arguments import require
-from evaluator.predictions.loading import NATURAL_KEY, RATES, VALUES, Predictions, read_predictions
+from evaluator.predictions.loading import NATURAL_KEY, PREDICTED, RATES, Predictions, read_predictions
 from evaluator.truth.csv_tables import require_one_column
 from evaluator.truth.ground_truth import Manifest
 
@@ -33,7 +33,7 @@ def predictions_from_frame(
 ) -> Predictions:
     """Read predictions from a frame with one row per sequence, in any order, as a CSV table has them.
 
-    Values are seconds in `column`, by default `ttc` or `ttc_s`; or scale ratios in `scale_ratio`, with a
+    Values are seconds in `column`, by default `ttc_s`, else `ttc`; or scale ratios in `scale_ratio`, with a
     column `fps` or `frame_gap`. Keys are the columns `bag_stamp`, `cam_id`, `ts` and `track_id`, else
     `anno_id` (a column or the index). Raises `Rejected` as for a file, `ValueError` for a frame without keys
     or rates, `KeyError` for a missing column.
@@ -63,9 +63,13 @@ def predictions_from_frame(
 
 
 def _value_column(names: list[str]) -> str:
-    values = [name for name in VALUES if name in names]
-    if len(set(values)) != 1:
-        raise KeyError(f"The frame has the columns {', '.join(names)}; expected one of {', '.join(VALUES)}.")
+    # A frame of the ground truth, with the predictions beside it, has `ttc` too.
+    values = [name for name in ("ttc_s", "ttc", RATIO) if name in names]
+    if not values or PREDICTED in names:
+        raise KeyError(
+            f"The frame has the columns {', '.join(names)}; expected ttc_s, ttc or {RATIO}, or column= with "
+            "the name of another one."
+        )
     return values[0]
 
 

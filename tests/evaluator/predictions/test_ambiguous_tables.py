@@ -112,8 +112,12 @@ def test_a_frame_may_name_its_seconds_as_a_file_does_and_needs_a_rate_for_ratios
             "scale_ratio",
             scale_ratio_to_ttc(ratios, fps_hz=2).tolist(),
         )
-    with pytest.raises(KeyError, match="expected one of ttc, ttc_s, scale_ratio"):
-        predictions_from_frame(frame.assign(ttc=1.0, ttc_s=2.0), manifest=MANIFEST)
+    # The true times beside the predictions.
+    both = frame.assign(ttc=TRUTH.ttc_s, ttc_s=2.0)
+    assert predictions_from_frame(both, manifest=MANIFEST).ttc_s.tolist() == [2.0] * 3
+    for others in ({"mine": 1.0}, {"ttc_s": 1.0, "predicted_ttc_s": 2.0}):
+        with pytest.raises(KeyError, match="expected ttc_s, ttc or scale_ratio, or column="):
+            predictions_from_frame(frame.assign(**others), manifest=MANIFEST)
 
 
 def test_masked_entries_are_no_values() -> None:
