@@ -25,13 +25,14 @@ from evaluator.cli.options import (
 )
 from evaluator.cli.reading import TABLE, labels_of, naming, predictions_of, units_asked
 from evaluator.cli.tokens import has_token
-from evaluator.metrics.protocol import primary_of
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PROTOCOLS, primary_of
 from evaluator.scoring.significance import Difference
 from evaluator.tables.sentences import influence, others, p_cell, sentence
 from evaluator.units import in_words
 
 if TYPE_CHECKING:
     from evaluator.client.answers import Compared
+    from evaluator.metrics.protocol import ProtocolName
 
 Scores = Mapping[str, float | None]
 
@@ -52,6 +53,12 @@ Scores = Mapping[str, float | None]
     metavar="FILE",
     help="Ground truth: compare FIRST and SECOND as prediction files, offline.",
 )
+@click.option(
+    "--protocol",
+    type=click.Choice(list(PROTOCOLS)),
+    help=f"Protocol of an offline comparison, as the board's edition says; default: {DEFAULT_PROTOCOL}. "
+    "tsttc-2 also has the warning error.",
+)
 @unit_option
 @timeout_option("Stop waiting for the server's comparison after this time.", default=120.0)
 @url_option
@@ -62,6 +69,7 @@ def compare(
     second: str,
     split: str,
     truth_path: Path | None,
+    protocol: ProtocolName | None,
     unit: str | None,
     timeout_s: float,
     url: str,
@@ -79,8 +87,17 @@ def compare(
       tsttc compare new.json old.json --truth annotations/val/
     """
     if truth_path is not None:
-        _compare_files(Path(first), Path(second), truth_path, unit=unit, as_json=as_json)
+        _compare_files(
+            Path(first),
+            Path(second),
+            truth_path,
+            protocol=protocol or DEFAULT_PROTOCOL,
+            unit=unit,
+            as_json=as_json,
+        )
         return
+    if protocol is not None:
+        raise click.UsageError("--protocol needs --truth; a board's edition has its own protocol.")
     if unit is not None:
         raise click.UsageError("--unit needs --truth; a board's edition keeps its own unit.")
     with connect(url, with_token=has_token(url), timeout_s=timeout_s) as client:
@@ -122,7 +139,15 @@ def _server_s_words(
     yield from filter(None, (others(comparison.differences(), primary=primary_of(scores[0])),))
 
 
-def _compare_files(first: Path, second: Path, truth_path: Path, *, unit: str | None, as_json: bool) -> None:
+def _compare_files(
+    first: Path,
+    second: Path,
+    truth_path: Path,
+    *,
+    protocol: ProtocolName,
+    unit: str | None,
+    as_json: bool,
+) -> None:
     from evaluator import compare_predictions, evaluate, read_predictions, read_truth, rounded  # noqa: PLC0415 -- numpy
 
     with naming(truth_path):
@@ -133,8 +158,8 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, unit: str | N
         with naming(path):
             predictions = read_predictions(predictions_of(path), manifest=truth.manifest)
             read.append(predictions)
-            reports.append(evaluate(predictions, truth))
-    differences = compare_predictions(read[0], read[1], truth, unit=taken.kind)
+            reports.append(evaluate(predictions, truth, protocol=protocol))
+    differences = compare_predictions(read[0], read[1], truth, protocol=protocol, unit=taken.kind)
     if as_json:
         documents = {
             name: {

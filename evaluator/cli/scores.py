@@ -24,8 +24,9 @@ from evaluator.cli.reading import (
 )
 from evaluator.cli.warnings_in_words import echo_warnings
 from evaluator.counting import counted
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PROTOCOLS
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, OVERALL, PROTOCOLS
 from evaluator.tables.results import WRITERS, ResultRow, names_of
+from evaluator.tables.sentences import without_interval
 from evaluator.units import in_words
 
 if TYPE_CHECKING:
@@ -144,6 +145,10 @@ def score(
         groups = f"No {by} has a confidence interval" if by else "There are no confidence intervals"
         few = f"one needs 8 {in_words(taken.kind)} of equal size, or more of unequal size"
         click.echo(f"{groups}: {few}; found {taken} in all.", err=True)
+    if taken and not as_json and by is None:
+        for one, row in zip(scored_files, rows, strict=True):
+            if any(row.intervals.values()):
+                _say_what_has_none(one, row, taken)
     tabular = by is not None or with_intervals or len(scored_files) > 1
     gates.show_and_judge(
         _document(scored_files, rows if tabular else [], by=by, taken=taken),
@@ -263,6 +268,25 @@ def _rows(scored: _Scored, *, by: GroupName | None, taken: Units | None) -> Iter
         _intervals(report, taken) if taken else {},
         drawn,
     )
+
+
+def _say_what_has_none(scored: _Scored, row: ResultRow, taken: Units) -> None:
+    from evaluator.scoring.scores import Scorer  # noqa: PLC0415 -- numpy, as above
+    from evaluator.scoring.uncertainty import by_units, degrees_of  # noqa: PLC0415 -- likewise
+
+    details = scored.report.require_details()
+    counts = {OVERALL: scored.report.n_sequences, **details.truth.counts_of(details.protocol.ranges)}
+    rules = details.protocol
+    degrees = degrees_of(by_units(Scorer(details.truth, rules).recording_counts, taken))
+    reasons = without_interval(
+        {name: row.scores[name] for name, ends in row.intervals.items() if ends is None},
+        counts=counts,
+        decimals=rules.decimals,
+        n_effective=dict(zip(rules.score_names, degrees.tolist(), strict=True)),
+        unit=taken.kind,
+    )
+    for reason in reasons:
+        click.echo(f"No interval of {reason}.", err=True)
 
 
 def _intervals(report: Report, taken: Units) -> dict[str, tuple[float, float] | None]:

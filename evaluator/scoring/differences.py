@@ -17,7 +17,14 @@ from evaluator.metrics.scale import Floats
 from evaluator.predictions.loading import Predictions
 from evaluator.scoring.results import rounded
 from evaluator.scoring.scores import Scorer
-from evaluator.scoring.significance import SIGNIFICANT, Difference, Influence, cut_off, p_below
+from evaluator.scoring.significance import (
+    MIN_DIFFERENT,
+    SIGNIFICANT,
+    Difference,
+    Influence,
+    cut_off,
+    p_below,
+)
 from evaluator.scoring.uncertainty import by_units, degrees_of, generator_of, usable_columns
 from evaluator.truth.ground_truth import GroundTruth
 from evaluator.units import RECORDING, UnitKind
@@ -118,7 +125,9 @@ def difference(
     gaps, n, degrees = first - second, counts.sum(axis=0), degrees_of(counts)
     flips = sign_flips(gaps, counts, rng=signs, n_flips=n_flips)
     # With 8 degrees of freedom there are 8 units, and an end is missing after a few dozen flips alone.
+    n_different = np.count_nonzero(np.abs(gaps) > _NO_SUM * (np.abs(first) + np.abs(second)), axis=0)
     is_known = usable_columns(counts) & np.isfinite(flips.low) & np.isfinite(flips.high)
+    is_known &= n_different >= MIN_DIFFERENT
     return {
         name: Difference(
             float(gaps[:, i].sum() / n[i]),
@@ -127,6 +136,8 @@ def difference(
             p=float(flips.p[i]) if is_known[i] else None,
             n_effective=float(degrees[i]),
             unit=unit,
+            n_different=int(n_different[i]),
+            n_units=int(np.count_nonzero(counts[:, i])),
         )
         for i, name in enumerate(names)
         if n[i] > 0
@@ -140,7 +151,7 @@ def influence(
 
     `differences` and `counts` are those of one column, (units,). Units that favour the better entry most are
     left out first. The first number is an upper bound (Broderick, Giordano and Meager, arXiv 2011.14999), the
-    second is exact.
+    second is exact. The first is None if it leaves too few units for a test.
     """
     total = float(differences.sum())
     favours = differences * np.sign(total)
@@ -152,17 +163,30 @@ def influence(
     n_to_turn = int(turned[0]) + 1 if turned.size else None
     seed = int(rng.integers(_SEEDS))
 
-    def is_significant(n_left_out: int) -> bool:
+    def kept_without(n_left_out: int) -> Floats:
         kept = np.ones(len(order), dtype=np.float64)
         kept[order[:n_left_out]] = 0.0
+        return kept
+
+    def is_testable(n_left_out: int) -> bool:
+        kept = kept_without(n_left_out)
+        n_different = int(np.count_nonzero(differences * kept))
+        return n_different >= MIN_DIFFERENT and bool(usable_columns((counts * kept)[:, None])[0])
+
+    def is_significant(n_left_out: int) -> bool:
+        kept = kept_without(n_left_out)
         signs = np.random.default_rng(seed)
         rest = sign_flips((differences * kept)[:, None], (counts * kept)[:, None], rng=signs, n_flips=n_flips)
         return bool(rest.p[0] < SIGNIFICANT)
 
+    n_to_undecided = _first_false(is_significant, n_to_turn or n_favouring) if is_significant(0) else None
+    if n_to_undecided is not None and not is_testable(n_to_undecided):
+        n_to_undecided = None
     return Influence(
         n_units=int((counts > 0).sum()),
-        n_to_undecided=_first_false(is_significant, n_to_turn or n_favouring) if is_significant(0) else None,
+        n_to_undecided=n_to_undecided,
         n_to_turn=n_to_turn,
+        is_turn_significant=n_to_turn is not None and is_testable(n_to_turn) and is_significant(n_to_turn),
     )
 
 

@@ -23,8 +23,9 @@ MIN_DEGREES: Final = 8.0
 MIN_DIFFERENT: Final = 6
 """With fewer units that differ, or have an error, nothing is said: no sign flips give a p below 5%."""
 
-# Of the normal distribution's 97.5% point: what a difference must be to be found with a power of 80%.
-_DETECTABLE: Final = (1.959964 + 0.841621) / 1.959964
+# Of the normal distribution: the 97.5% point, and that plus the 80% point, for a power of 80%.
+_TWO_SIDED: Final = 1.959964
+_POWER: Final = 1.959964 + 0.841621
 
 
 def p_below(p: float) -> float:
@@ -40,12 +41,14 @@ def p_below(p: float) -> float:
 class Influence:
     """The numbers of units to leave out until a difference changes; None if impossible.
 
-    `n_to_undecided`: until it is insignificant; `n_to_turn`: until it has the other sign.
+    `n_to_undecided`: until it is insignificant, with enough units left for a test; `n_to_turn`: until it has
+    the other sign, and `is_turn_significant` whether significantly.
     """
 
     n_units: int
     n_to_undecided: int | None = None
     n_to_turn: int | None = None
+    is_turn_significant: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +56,7 @@ class Difference:
     """First score minus second in one column: below 0, the first is better.
 
     `low` and `high` bound its 95% interval, and `p` is from the two-sided sign-flip test; all are None if
-    there are too few units.
+    there are too few units, or fewer than 6 in which the two differ: `n_different` of `n_units`.
     `p_below` is the smallest of `P_CLASSES` above p, else 1; hidden splits show only this. `n_effective`
     is the effective number of units, `unit` is their kind (recording, day or given), and `influence` has
     the numbers of units without which the difference is not significant, or has the other sign.
@@ -67,6 +70,8 @@ class Difference:
     n_effective: float | None = None
     influence: Influence | None = field(default=None, repr=False)
     unit: str = field(default=RECORDING, repr=False)
+    n_different: int | None = field(default=None, repr=False)
+    n_units: int | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if self.p_below is None and self.p is not None:
@@ -79,15 +84,40 @@ class Difference:
 
     @property
     def detectable_difference(self) -> float | None:
-        """The difference detected with about 80% power, 1.43 half widths; None if significant."""
+        """The difference detected with about 80% power; None if significant."""
         return None if self.is_significant else self.resolution
 
     @property
     def resolution(self) -> float | None:
-        """The detectable difference also where it is significant: the resolution of the recordings."""
+        """The detectable difference also where it is significant: the resolution of the recordings.
+
+        It is 1.43 half widths, and more where most units do not differ: there a larger difference comes with
+        more units that differ, and so with more variance.
+        """
         if self.low is None or self.high is None:
             return None
-        return _DETECTABLE * (self.high - self.low) / 2
+        error = (self.high - self.low) / 2 / _TWO_SIDED
+        if self.n_different is None or self.n_units is None or 2 * self.n_different >= self.n_units:
+            return _POWER * error
+        # x = z √(V + x) for a number x of further units with one typical difference, V of which there are.
+        a_unit = error / math.sqrt(self.n_different)
+        return a_unit * (_POWER**2 / 2 + _POWER * math.sqrt(_POWER**2 / 4 + self.n_different))
+
+    @property
+    def why_untested(self) -> str:
+        """Why there is neither interval nor p; empty where there is.
+
+        >>> Difference(0.1, n_effective=700.0, n_different=2, n_units=700).why_untested
+        'the methods differ in 2 of 700 recordings, too few to test (at least 6 needed)'
+        """
+        if self.p_below is not None:
+            return ""
+        if self.n_effective is None or self.n_effective < MIN_DEGREES:
+            return too_few_units(self.n_effective, unit=self.unit)
+        needed = f"too few to test (at least {MIN_DIFFERENT} needed)"
+        if self.n_different is None or self.n_units is None:
+            return f"the methods differ in few {in_words(self.unit)}, {needed}"
+        return f"the methods differ in {self.n_different:,} of {in_words(self.unit, self.n_units)}, {needed}"
 
     def turned(self) -> Difference:
         """Swap first and second."""

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evaluator.metrics.scale import Floats
-from evaluator.scoring.significance import MIN_DEGREES
+from evaluator.scoring.significance import MIN_DEGREES, MIN_DIFFERENT
 from evaluator.units import RECORDING, Units
 
 CONFIDENCE: Final = 0.95
@@ -105,7 +105,10 @@ class Bootstrap:
         return np.asarray(np.multiply(shaped, self._inverse_counts, out=shaped))
 
     def intervals(self, sums: Floats) -> tuple[Floats, Floats]:
-        """Compute 95% intervals of N entries by `sums` (N, G, columns): two (N, columns), NaN if absent."""
+        """Compute 95% intervals of N entries by `sums` (N, G, columns): two (N, columns), NaN if absent.
+
+        An interval is absent in columns that are not usable, and where fewer than 6 units have an error.
+        """
         # The shape of the product is fixed, so that an interval never depends on other entries of the board.
         low = np.full((len(sums), sums.shape[2]), np.nan)
         high = low.copy()
@@ -121,6 +124,8 @@ class Bootstrap:
             for i, column in enumerate(np.flatnonzero(self.usable).tolist()):
                 ends = _ends(deviations[:, i], tail=float(self._tails[column]))
                 low[rows, column], high[rows, column] = means[:, column] + ends
+        is_absent = np.count_nonzero(sums, axis=1) < MIN_DIFFERENT
+        low[is_absent], high[is_absent] = np.nan, np.nan
         return low, high
 
 

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Final
 
 from evaluator.metrics.protocol import column_words, metric_of, split_name
-from evaluator.scoring.significance import LEAST_P, SIGNIFICANT, Difference, best_of, too_few_units
+from evaluator.metrics.registry import WARNING
+from evaluator.scoring.significance import (
+    LEAST_P,
+    MIN_DEGREES,
+    MIN_DIFFERENT,
+    SIGNIFICANT,
+    Difference,
+    best_of,
+    too_few_units,
+)
 from evaluator.units import in_words
 
 _MAX_NAMED: Final = 3
@@ -57,6 +67,9 @@ def sentence(
     column, unit = column_words(name), metric_of(name).unit_of_difference
     if round(difference.difference, decimals) == 0:
         alike = f"{first} and {second} have the same {column} to {_DECIMALS_IN_WORDS[decimals]}."
+        if not withheld and difference.n_different is not None and difference.p_below is None:
+            every = in_words(difference.unit, difference.n_units)
+            alike += f" They differ in {difference.n_different:,} of {every}."
         return f"{alike} {withheld}".rstrip()
     digits = _digits(difference, decimals)
     gap = (
@@ -66,8 +79,9 @@ def sentence(
     if withheld:
         return f"{gap}. {withheld}"
     if difference.low is None or difference.high is None or difference.p_below is None:
-        few = too_few_units(difference.n_effective, unit=difference.unit)
-        return f"{gap}; there are {few} to say whether that is significant."
+        if difference.n_effective is not None and difference.n_effective >= MIN_DEGREES:
+            return f"{gap}; {difference.why_untested}."
+        return f"{gap}; there are {difference.why_untested} to say whether that is significant."
     ends = _ends(difference.difference, difference.low, difference.high, digits)
     if difference.is_significant and 0 in (difference.low, difference.high):
         # So it is on a hidden split alone, where p judges and the ends only say how large.
@@ -108,7 +122,8 @@ def _digits(difference: Difference, decimals: int) -> int:
     half = (difference.high - difference.low) / 2
     fewest = 0 if half >= 10 else 1 if half >= 0.995 else 2
     smallest = min(abs(value) for value in (difference.difference, difference.low, difference.high) if value)
-    return min(decimals, max(fewest, next((n for n in (0, 1) if round(smallest, n)), 2)))
+    # The smallest keeps one significant digit: 0.6 is not shown as 1.
+    return min(decimals, max(fewest, next((n for n in (0, 1) if smallest >= 10.0**-n), 2)))
 
 
 def influence(first: str, second: str, *, difference: Difference) -> str:
@@ -129,11 +144,12 @@ If 59 are left out, B is better.
     few, turn = known.n_to_undecided, known.n_to_turn
     if few is None and turn is None:
         return ""
+    is_better = f"is {'significantly ' if known.is_turn_significant else ''}better"
     of_all = f"of {in_words(difference.unit, known.n_units)} that most favour {better} are left out"
     if few is None:
-        return f"If the {turn:,} {of_all}, {worse} is better."
+        return f"If the {turn:,} {of_all}, {worse} {is_better}."
     head = f"If the {few:,} {of_all}, the difference is no longer significant."
-    return head if turn is None else f"{head} If {turn:,} are left out, {worse} is better."
+    return head if turn is None else f"{head} If {turn:,} are left out, {worse} {is_better}."
 
 
 def selection(n_tried: Mapping[str, int]) -> str:
@@ -141,8 +157,8 @@ def selection(n_tried: Mapping[str, int]) -> str:
 
     >>> print(selection({"A": 3, "B": 1, "C": 10}))
     A is the best of 3 scored submissions, C of 10. Picking the best of several equally good submissions \
-makes a method look better by chance: by about 0.60 standard errors of the difference if the best of 3 is \
-picked, and 1.09 if the best of 10.
+makes a method look better by chance: by up to about 0.60 standard errors of the difference if the best of 3 \
+is picked, and 1.09 if the best of 10.
     """
     chosen = {name: n for name, n in n_tried.items() if n > 1}
     if not chosen:
@@ -157,8 +173,80 @@ picked, and 1.09 if the best of 10.
     listed = ", and ".join([", ".join(amounts[:-1]), amounts[-1]] if others else amounts)
     return (
         f"{who}. Picking the best of several equally good submissions makes a method look better by chance: "
-        f"by about {listed}."
+        f"by up to about {listed}."
     )
+
+
+def without_interval(
+    scores: Mapping[str, float | None],
+    *,
+    counts: Mapping[str, int],
+    decimals: int,
+    n_effective: Mapping[str, float],
+    unit: str,
+) -> list[str]:
+    """Say why these scores of a row have no interval, though others have; what 0 errors say.
+
+    `counts` are numbers of sequences by TTC range, `n_effective` are effective numbers of units by score.
+
+    >>> counts = {"overall": 28_600, "large": 12_270}
+    >>> scores = {"mid_large": 0.1, "rte_large": 0.2, "warning_large": 0.0}
+    >>> for line in without_interval(scores, counts=counts, decimals=2, n_effective={}, unit="day"):
+    ...     print(line)
+    MiD large, RTE large: fewer than 6 days have an error
+    WE large: an error in 0 of 12,270 sequences (below 0.03% at 95%, if sequences were independent)
+    """
+    labels: dict[str, list[str]] = {}
+    for name, value in scores.items():
+        if value is None:
+            continue
+        metric, ttc_range = metric_of(name), split_name(name)[1]
+        n_sequences, degrees = counts.get(ttc_range), n_effective.get(name, MIN_DEGREES)
+        if degrees < MIN_DEGREES:
+            reason = too_few_units(degrees, unit=unit)
+        elif value or not n_sequences:
+            reason = f"fewer than {MIN_DIFFERENT} {in_words(unit)} have an error"
+        elif metric == WARNING:
+            reason = _no_warning_error(n_sequences, decimals)
+        else:
+            reason = "no sequence has an error"
+        labels.setdefault(reason, []).append(f"{metric.symbol} {ttc_range}")
+    return [f"{', '.join(names)}: {reason}" for reason, names in labels.items()]
+
+
+def _no_warning_error(n_sequences: int, decimals: int) -> str:
+    # A share that is published as 0.00 may be a few errors of very many sequences.
+    most = max(0, math.ceil(0.5 * 10.0**-decimals * n_sequences / 100) - 1)
+    limit = _rounded_up(100 * _poisson_bound(most) / n_sequences)
+    return (
+        f"an error in {'at most ' if most else ''}{most:,} of {n_sequences:,} sequences "
+        f"(below {limit}% at 95%, if sequences were independent)"
+    )
+
+
+def _poisson_bound(n: int) -> float:
+    """Compute the 95% upper limit of a mean after `n` events: 3.0 after none.
+
+    >>> [round(_poisson_bound(n), 2) for n in (0, 1, 2)]
+    [3.0, 4.74, 6.3]
+    """
+    low, high = 0.0, n + 10 * math.sqrt(n + 1)
+    for _ in range(60):
+        mean = (low + high) / 2
+        below = math.exp(-mean) * math.fsum(math.pow(mean, k) / math.factorial(k) for k in range(n + 1))
+        low, high = (mean, high) if below > SIGNIFICANT else (low, mean)
+    return high
+
+
+def _rounded_up(value: float) -> str:
+    """Round up to one significant digit.
+
+    >>> _rounded_up(0.0244), _rounded_up(0.3), _rounded_up(1.2)
+    ('0.03', '0.3', '2')
+    """
+    digits = -math.floor(math.log10(value))
+    steps = math.ceil(round(value * 10.0**digits, 9))
+    return f"{steps * 10.0**-digits:.{max(digits, 0)}f}"
 
 
 def resolutions(pairs: Sequence[Mapping[str, Difference]]) -> dict[str, float]:
@@ -194,7 +282,7 @@ def others(differences: Mapping[str, Difference], *, primary: str) -> str:
     ]
     differ = "differs" if len(different) <= 1 else "differ"
     named = f": {', '.join(different)}" if 0 < len(different) <= _MAX_NAMED else ""
-    return (
-        f"{len(different) or 'None'} of the {len(tested)} other metrics {differ} significantly "
-        f"(p < {SIGNIFICANT:g}, uncorrected){named}."
-    )
+    ending = f"significantly (p < {SIGNIFICANT:g}, uncorrected){named}."
+    if len(tested) == 1:
+        return f"The other metric {'differs' if different else 'does not differ'} {ending}"
+    return f"{len(different) or 'None'} of the {len(tested)} other metrics {differ} {ending}"

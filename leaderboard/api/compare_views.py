@@ -38,22 +38,21 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     low = serializers.FloatField(
         allow_null=True,
         help_text="Lower end of the 95% confidence interval, rounded outwards where the ground truth is "
-        "hidden; null: too few units, or withheld.",
+        "hidden; null: too few units, fewer than 6 in which the two differ (see `sentence`), or withheld.",
     )
     high = serializers.FloatField(
         allow_null=True,
         help_text="Upper end of the 95% confidence interval, rounded outwards where the ground truth is "
-        "hidden; null: too few units, or withheld.",
+        "hidden; null: too few units, fewer than 6 in which the two differ (see `sentence`), or withheld.",
     )
     p = serializers.FloatField(
         allow_null=True,
-        help_text="p-value of the two-sided cluster sign-flip test, four decimals; null: too few units, "
-        "withheld, or the ground truth is hidden and only `p_below` is published.",
+        help_text="p-value of the two-sided cluster sign-flip test, four decimals; null: as `low`, "
+        "or the ground truth is hidden and only `p_below` is published.",
     )
     p_below = serializers.FloatField(
         allow_null=True,
-        help_text="The smallest of 0.001, 0.01 and 0.05 that p is below, else 1; null: too few units, "
-        "or withheld.",
+        help_text="The smallest of 0.001, 0.01 and 0.05 that p is below, else 1; null: as `low`.",
     )
     n_effective = serializers.FloatField(
         allow_null=True,
@@ -66,7 +65,7 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     )
     detectable_difference = serializers.SerializerMethodField(
         help_text="The smallest difference that the test detects with about 80% power, an estimate; null: "
-        "this one is significant, or there are too few units."
+        "this one is significant, or `low` is null."
     )
     sentence = serializers.SerializerMethodField(
         help_text="The result as a sentence. Its p is uncorrected, for this column and pair alone."

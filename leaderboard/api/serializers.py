@@ -271,8 +271,14 @@ class DetailsSerializer(serializers.Serializer[Details]):
 class UncertaintySerializer(serializers.Serializer[ConfidenceInterval]):
     """The 95% confidence interval and rank range of one score; null where unknown."""
 
-    low = serializers.FloatField(allow_null=True, help_text="Lower end of the 95% confidence interval.")
-    high = serializers.FloatField(allow_null=True, help_text="Upper end of the 95% confidence interval.")
+    low = serializers.FloatField(
+        allow_null=True,
+        help_text="Lower end of the 95% confidence interval; null: not computed yet, too few units, or fewer "
+        "than 6 with an error.",
+    )
+    high = serializers.FloatField(
+        allow_null=True, help_text="Upper end of the 95% confidence interval; null: as `low`."
+    )
     rank_low = serializers.IntegerField(allow_null=True, help_text="Best rank of the rank range.")
     rank_high = serializers.IntegerField(allow_null=True, help_text="Worst rank of the rank range.")
     is_with_best = serializers.BooleanField(

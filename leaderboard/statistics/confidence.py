@@ -24,7 +24,7 @@ from evaluator import rounded
 from evaluator.metrics.protocol import OVERALL, score_name
 from evaluator.scoring import uncertainty
 from evaluator.scoring.ranges import Quoted, rank_ranges
-from evaluator.scoring.significance import MIN_DEGREES, cut_off, too_few_units
+from evaluator.scoring.significance import MIN_DEGREES, MIN_DIFFERENT, cut_off, too_few_units
 from leaderboard import board_versions
 from leaderboard.boards.rows import printed_decimals
 from leaderboard.db import clock
@@ -218,7 +218,12 @@ def _intervals(entries: Entries, *, between: Callable[[], None]) -> tuple[list[S
     rows = [by_id[pk] for pk in missing if pk in by_id]
     made: list[Score] = []
     faults: list[Exception] = []
-    readable = _readable(edition, rows, faults=faults)
+
+    def has_new(row: ScoredEntry, sums: Floats) -> bool:
+        columns = [column_of[score_name(each.metric, each.ttc_range)] for each in missing[row.evaluation_id]]
+        return bool((np.count_nonzero(sums[:, columns], axis=0) >= MIN_DIFFERENT).any())
+
+    readable = (pair for pair in _readable(edition, rows, faults=faults) if has_new(*pair))
     while some := list(itertools.islice(readable, uncertainty.BATCH)):
         between()
         sums = np.stack([own for _, own in some])
@@ -227,10 +232,12 @@ def _intervals(entries: Entries, *, between: Callable[[], None]) -> tuple[list[S
         for i, (row, _) in enumerate(some):
             for score in missing[row.evaluation_id]:
                 j = column_of[score_name(score.metric, score.ttc_range)]
-                score.low, score.high = (
-                    rounded(ends[i, j], decimals=edition.decimals) for ends in (lows, highs)
-                )
-                made.append(score)
+                # Where fewer than 6 units have an error there is none.
+                if np.isfinite(lows[i, j]):
+                    score.low, score.high = (
+                        rounded(ends[i, j], decimals=edition.decimals) for ends in (lows, highs)
+                    )
+                    made.append(score)
     return made, faults
 
 

@@ -95,7 +95,11 @@ def published_difference(computed: Difference, shown: Difference, *, edition: Ed
     On a hidden split the ends are rounded outwards, so 0 may be an end although p is below 0.05: `p_below`
     alone says what is significant.
     """
-    if computed.low is None or computed.high is None or not is_hidden(edition):
+    if not is_hidden(edition):
+        return shown
+    # In how many units two files differ would tell of others' predictions.
+    shown = replace(shown, n_different=None, n_units=None)
+    if computed.low is None or computed.high is None:
         return shown
     low, high = _ends_of(computed.low, computed.high, edition=edition)
     low, high = min(low, shown.difference), max(high, shown.difference)

@@ -9,7 +9,6 @@ from django.utils.text import get_text_list
 from evaluator import Difference
 from evaluator.metrics.protocol import grouped_names, metric_of
 from evaluator.scoring.results import format_rounded
-from evaluator.scoring.significance import too_few_units
 from evaluator.tables import sentences
 from evaluator.tables.sentences import p_cell
 from evaluator.units import in_words
@@ -136,9 +135,7 @@ def _difference_row(name: str, pair: Pair, difference: Difference, scale_end: fl
         "interval": interval_of(difference, decimals=decimals),
         "p": p_cell(difference.p, difference.p_below),
         # why there is neither interval nor p
-        "reason": ""
-        if difference.p_below is not None
-        else too_few_units(difference.n_effective, unit=difference.unit),
+        "reason": difference.why_untested,
         "is_significant": difference.is_significant,
         "drawn": svg.difference(scale_end, difference.difference, difference.low, difference.high),
     }

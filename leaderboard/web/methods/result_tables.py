@@ -1,7 +1,7 @@
 """Tables of results of methods and submissions, with the counts behind each number."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import shorten
 from typing import Any, Final, NamedTuple
 from urllib.parse import urlencode
@@ -23,6 +23,7 @@ from leaderboard.web.boards.score_columns import (
     Cell,
     Heading,
     cell_css,
+    ends_of,
     score_cells,
     score_heading,
 )
@@ -47,6 +48,7 @@ class ResultTable:
 
     metrics: tuple[Metric, ...]
     rows: tuple[RangeRow, ...]
+    without_interval: tuple[str, ...] = ()  # of a row with intervals: what has none, and why
 
     @property
     def has_intervals(self) -> bool:
@@ -74,7 +76,18 @@ def result_table(entry: Entry, counts: Mapping[str, int]) -> ResultTable:
 
 def edition_table(entry: Entry, edition: Edition) -> ResultTable:
     truth = edition.ground_truth
-    return result_table(entry, {OVERALL: truth.n_sequences, **truth.counts})
+    counts = {OVERALL: truth.n_sequences, **truth.counts}
+    table = result_table(entry, counts)
+    if not table.has_intervals:
+        return table
+    reasons = sentences.without_interval(
+        {name: value for name, value in entry.scores.items() if ends_of(entry, name) is None},
+        counts=counts,
+        decimals=entry.decimals,
+        n_effective=edition.n_effective,
+        unit=edition.unit,
+    )
+    return replace(table, without_interval=tuple(reasons))
 
 
 def method_result(result: Result, pairs: Sequence[Pair]) -> dict[str, Any]:

@@ -100,6 +100,27 @@ def test_files_are_compared_offline_as_the_library_does(
     assert "broken.json is rejected" in bad.stderr
 
 
+def test_files_are_compared_offline_by_the_protocol_of_the_board(
+    tsttc: Tsttc, site: RecordedSite, tmp_path: Path, truth_of_30_recordings: Path
+) -> None:
+    truth = read_truth(truth_of_30_recordings)
+    files = []
+    for factor in (1.05, 1.3):
+        values = dict(zip(truth.manifest.anno_id_keys, (truth.ttc_s * factor).tolist(), strict=True))
+        files.append(tmp_path / f"{factor}.json")
+        files[-1].write_text(json.dumps(values))
+    arguments = ["compare", *files, "--truth", truth_of_30_recordings, "--protocol", "tsttc-2"]
+    compared = json.loads(tsttc(*arguments, "--json").stdout)["differences"]
+    read = [read_predictions(path.read_bytes(), manifest=truth.manifest) for path in files]
+    expected = compare_predictions(read[0], read[1], truth, protocol="tsttc-2")
+    assert compared.keys() == expected.keys()
+    assert compared["warning"]["difference"] == expected["warning"].difference
+    assert "WE" in tsttc(*arguments).stdout
+    assert site.requests == []
+    online = tsttc("compare", "A", "B", "--protocol", "tsttc-2")
+    assert (online.exit_code, "--protocol needs --truth" in online.stderr) == (2, True)
+
+
 @pytest.fixture
 def truth_of_30_recordings(tmp_path: Path) -> Path:
     rows = [f"{i},bag{i % 30},1,{i},7,{(i % 37 - 18) / 2 + 0.3}" for i in range(300)]

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evaluator import compare_predictions, confidence_intervals, evaluate
-from evaluator.scoring.differences import N_SIGN_FLIPS, rounded_difference, sign_flips
+from evaluator.scoring.differences import N_SIGN_FLIPS, difference, rounded_difference, sign_flips
 from evaluator.scoring.significance import LEAST_P, Difference
 from tests.evaluator.recordings import Floats, permutation_p, predictions, sign_flip_p, world
 
@@ -187,5 +187,32 @@ def test_two_files_are_compared_as_a_board_publishes_it() -> None:
     for name, gap in compare_predictions(first, second, truth).items():
         assert gap == rounded_difference(exact[name], first=means[0][name], second=means[1][name], decimals=2)
     same = compare_predictions(first, first, truth)["mid"]
-    assert (same.difference, same.low, same.high, same.p) == (0, 0, 0, 1)
+    assert (same.difference, same.low, same.high, same.p) == (0, None, None, None)
+    assert same.n_different == 0
     assert not same.is_significant
+
+
+@pytest.mark.parametrize("n_different", [0, 1, 5, 6])
+def test_methods_are_tested_only_where_they_differ_in_six_units(n_different: int) -> None:
+    counts = np.full((40, 1), 10.0)
+    second = np.full((40, 1), 100.0)
+    first = second.copy()
+    first[:n_different] += 50.0
+    gap = difference(first, second, counts, names=["mid"], signs=np.random.default_rng(0))["mid"]
+    assert (gap.n_different, gap.n_units) == (n_different, 40)
+    is_tested = n_different >= 6
+    assert [each is not None for each in (gap.low, gap.high, gap.p, gap.p_below)] == [is_tested] * 4
+    assert (gap.resolution is not None) == is_tested
+    assert gap.why_untested == (
+        ""
+        if is_tested
+        else f"the methods differ in {n_different} of 40 recordings, too few to test (at least 6 needed)"
+    )
+
+
+def test_a_difference_of_summing_order_is_none() -> None:
+    counts = np.full((40, 1), 3.0)
+    first, second = np.full((40, 1), 0.1 + 0.2 + 0.3), np.full((40, 1), 0.3 + 0.2 + 0.1)
+    assert (first != second).any()
+    gap = difference(first, second, counts, names=["mid"], signs=np.random.default_rng(0))["mid"]
+    assert (gap.n_different, gap.p) == (0, None)

@@ -115,3 +115,14 @@ def test_an_interval_depends_on_its_own_entry_alone() -> None:
     for i in range(len(sums)):
         own_low, own_high = bootstrap.intervals(sums[i : i + 1])
         assert (own_low[0, 0], own_high[0, 0]) == pytest.approx((low[i, 0], high[i, 0]), rel=1e-9)
+
+
+@pytest.mark.parametrize("n_failing", [0, 1, 5, 6])
+def test_a_mean_has_an_interval_with_an_error_in_at_least_six_units(n_failing: int) -> None:
+    counts = np.full((40, 2), 10.0)
+    sums = np.zeros((1, 40, 2))
+    sums[0, :n_failing, 0] = 100.0
+    sums[0, :, 1] = 100.0
+    low, high = uncertainty.Bootstrap(counts, rng=np.random.default_rng(0), n_resamples=500).intervals(sums)
+    assert bool(np.isfinite(low[0, 0])) == bool(np.isfinite(high[0, 0])) == (n_failing >= 6)
+    assert np.isfinite(low[0, 1])

@@ -10,7 +10,7 @@ import pytest
 
 from tests import error_models
 from tests.error_models import Drawn, Model
-from tests.validity import coverage, fields, margin, worlds
+from tests.validity import coverage, fields, margin, rare, worlds
 from tests.validity.coverage import Coverage
 
 pytestmark = pytest.mark.slow
@@ -101,10 +101,23 @@ def test_rank_ranges_hold_where_one_recording_has_most_of_each_methods_error(n_r
 
 
 def test_a_worse_method_is_rarely_marked_as_best_because_one_recording_has_most_of_its_error() -> None:
-    """By a common bound of t, it was always marked."""
+    """By a common bound of t, it was marked in 91% of cases."""
     draw, means = worlds.dominated(n_methods=3, worse=1.15), np.array([1.0, 1.0, 1.15])
     ranks = fields.ranks_of(draw, means=means, n_recordings=150, n=100, rng=np.random.default_rng(7))
     assert ranks.last_marked <= 0.3
+
+
+@pytest.mark.parametrize("n_expected", [1, 3, 10, 40])
+def test_of_rare_errors_little_is_claimed_and_what_is_claimed_holds(n_expected: int) -> None:
+    """Of 1 expected error, the interval [0, 0] was shown in a third of all cases."""
+    rng = np.random.default_rng([8, n_expected])
+    result = rare.rare(n_expected, n_recordings=700, n=200, n_flips=999, n_resamples=500, rng=rng)
+    assert (result.mean_shown < 0.2) == (n_expected <= 3)
+    if n_expected >= 10:
+        assert result.mean >= 0.95 - 2 * margin(0.95, 200)
+        assert 0.65 <= result.power <= 0.9
+    if n_expected > 1:
+        assert result.difference >= 0.95 - 2 * margin(0.95, 100)
 
 
 def test_recordings_of_alike_days_need_days_as_units() -> None:

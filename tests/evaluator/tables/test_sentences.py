@@ -5,7 +5,7 @@ import re
 import pytest
 
 from evaluator.scoring.significance import Difference
-from evaluator.tables.sentences import sentence
+from evaluator.tables.sentences import others, sentence, without_interval
 
 FAR = Difference(-4.1, -5.3, -2.9, 0.0003)
 
@@ -133,3 +133,63 @@ def test_with_too_few_recordings_a_difference_means_nothing() -> None:
         "The MiD of A is 0.40 lower than that of B; "
         "there are too few recordings to say whether that is significant."
     )
+
+
+@pytest.mark.parametrize(
+    ("difference", "amount", "ends"),
+    [
+        (Difference(0.6, -25.0, 26.0, 0.9), "0.6 higher", "25.0 lower to 26.0 higher"),
+        (Difference(10.51, 0.51, 20.6, 0.04), "10.5 higher", "0.5 to 20.6 higher"),
+        (Difference(-0.06, -25.0, 26.0, 0.9), "0.06 lower", "26.00 higher to 25.00 lower"),
+    ],
+)
+def test_no_number_of_a_sentence_is_doubled_by_rounding(
+    difference: Difference, amount: str, ends: str
+) -> None:
+    text = sentence_of(difference)
+    assert f" is {amount} than" in text
+    assert f"interval: {ends};" in text
+
+
+def test_a_pair_that_differs_in_few_units_says_so() -> None:
+    few = Difference(0.01, n_effective=300.0, n_different=2, n_units=700)
+    assert sentence_of(few).endswith(
+        "; the methods differ in 2 of 700 recordings, too few to test (at least 6 needed)."
+    )
+    alike = sentence_of(Difference(0.0, n_effective=300.0, n_different=0, n_units=700))
+    assert alike.endswith("decimals. They differ in 0 of 700 recordings.")
+    hidden = sentence_of(Difference(0.1, n_effective=300.0))
+    assert hidden.endswith("; the methods differ in few recordings, too few to test (at least 6 needed).")
+
+
+def test_of_one_other_metric_the_sentence_is_in_the_singular() -> None:
+    alike = Difference(0.1, -0.2, 0.4, 0.5)
+    assert others({"mid": FAR, "rte": alike}, primary="mid") == (
+        "The other metric does not differ significantly (p < 0.05, uncorrected)."
+    )
+    assert others({"mid": alike, "rte": FAR}, primary="mid") == (
+        "The other metric differs significantly (p < 0.05, uncorrected): RTE overall."
+    )
+
+
+@pytest.mark.parametrize(
+    ("n_sequences", "decimals", "words"),
+    [
+        (12_270, 2, "an error in 0 of 12,270 sequences (below 0.03% at 95%, if sequences were independent)"),
+        (
+            28_600,
+            2,
+            "an error in at most 1 of 28,600 sequences (below 0.02% at 95%, if sequences were independent)",
+        ),
+        (100, 2, "an error in 0 of 100 sequences (below 3% at 95%, if sequences were independent)"),
+    ],
+)
+def test_no_error_is_a_bound_not_a_zero(n_sequences: int, decimals: int, words: str) -> None:
+    (line,) = without_interval(
+        {"warning_large": 0.0},
+        counts={"large": n_sequences},
+        decimals=decimals,
+        n_effective={"warning_large": 300.0},
+        unit="recording",
+    )
+    assert line == f"WE large: {words}"

@@ -128,6 +128,19 @@ def test_too_few_recordings_stay_too_few() -> None:
     assert published(few, few) == few
 
 
+def test_a_hidden_split_never_says_in_how_many_recordings_two_methods_differ() -> None:
+    few = Difference(0.1, n_effective=300.0, n_different=2, n_units=700)
+    many = Difference(0.5, 0.4, 0.6, 0.0001, n_effective=300.0, n_different=600, n_units=700)
+    for exact in (few, many):
+        assert published(exact, exact, is_hidden=False) == exact
+        public = published(exact, exact)
+        assert (public.n_different, public.n_units) == (None, None)
+        assert (public.p_below is None) == (exact is few)
+    assert published(few, few).why_untested == (
+        "the methods differ in few recordings, too few to test (at least 6 needed)"
+    )
+
+
 def test_nothing_finer_of_a_hidden_split_is_in_the_database(
     entries: list[Submission], edition: Edition, rival: Rival
 ) -> None:

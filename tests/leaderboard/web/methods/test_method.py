@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from django.test import Client
 
-from leaderboard.models import Edition, Method, User, Visibility
+from leaderboard.models import Edition, Method, Score, User, Visibility
 from tests import builders, pages
 from tests.leaderboard.web.boards.test_board import row_of
 
@@ -195,3 +195,23 @@ def test_own_method_offers_the_next_submission_and_lists_the_rejected_ones(
     address = html.unescape(links["Submit again"].attributes["href"])
     form = pages.get(signed_in, address).one("form", id="submit")
     assert form.one("input", name="method").attributes["value"] == "Night & day"
+
+
+def test_a_score_without_an_error_has_a_bound_and_no_interval(
+    client: Client, owner: User, tmp_path: Path
+) -> None:
+    """[0, 0] would say that no error can occur."""
+    edition = builders.import_truth(tmp_path, split="val", protocol="tsttc-2")
+    builders.open_values(edition)
+    builders.submit(owner, builders.predictions(edition, factor=1.0001), split="val")
+    builders.score_all()
+    builders.infer_all()
+    kept = {(each.metric, each.ttc_range): each for each in Score.objects.all()}
+    assert kept["warning", "overall"].value == 0
+    assert kept["warning", "overall"].low is None
+    assert kept["mid", "overall"].low is not None
+    n_sequences = edition.ground_truth.n_sequences
+    text = get(client, Method.objects.get()).text
+    assert "No interval: " in text
+    assert f"WE overall: an error in 0 of {n_sequences:,} sequences (below " in text
+    assert builders.infer_all() == 0, "what has no interval is not computed again"
