@@ -25,7 +25,7 @@ SPREAD := -n auto --dist loadfile --no-loadscope-reorder
 # So numpy has no threads of its own, which would only wait for each other. It reads this when it is imported.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo demo-runs test test-fast test-torch chaos bench lint format screenshots release lock echarts clean
+.PHONY: help demo demo-runs test test-fast test-torch chaos validation bench lint format screenshots release lock echarts clean
 
 help: ## list these commands
 	@awk -F ' ## ' '/^[a-z-]+:.* ## / { sub(/:.*/, "", $$1); printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -48,6 +48,10 @@ test-torch: $(DEV_STAMP) $(TORCH_STAMP) ## the tests that need torch, in an envi
 
 chaos: $(DEV_STAMP) ## 200 uploads while services fail; counts lost, doubly scored and stuck files
 	@$(PY) -m tests.chaos
+
+validation: $(DEV_STAMP) ## print the tables of docs/validation.md and the figures of docs/uncertainty.md; hours
+	$(PY) -m tests.validity
+	$(PY) -m tests.security.hidden_differences
 
 bench: $(DEV_STAMP) ## measure the figures of docs/capacity.md and compare them with their targets
 	@$(PY) -m benchmarks

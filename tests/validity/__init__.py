@@ -24,4 +24,6 @@ def margin(share: float, n: int) -> float:
 
 def percent(share: float, n: int, *, decimals: int = 1) -> str:
     """A simulated share with its margin."""
+    if not n:
+        return "–"
     return f"{100 * share:.{decimals}f} ± {100 * margin(share, n):.{decimals}f}"

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from tests import error_models
-from tests.validity import coverage, fields, percent, worlds
+from tests.validity import coverage, detectable, fields, percent, rare, worlds
 from tests.validity.coverage import Coverage, Shares
 
 N_RECORDINGS: Final = (20, 50, 100, 700)
@@ -58,6 +58,17 @@ DOMINATED_HEAD: Final = (
     "last worse by 15%: all ranges hold",
     "last marked as possibly the best",
 )
+RARE_HEAD: Final = (
+    "expected errors of each method",
+    "mean: interval shown",
+    "mean: it holds",
+    "difference: interval shown",
+    "difference: it holds",
+    "detectable difference found",
+)
+PAPERS_HEAD: Final = ("recordings", "correlation of methods", "all ranges hold beside 2 rows of papers")
+FAILING_HEAD: Final = ("failures", "recordings", "mean that fails", "difference: p < 0.05", "p ≤ 0.001")
+DETECTABLE_HEAD: Final = ("differences", "recordings", "detectable difference found", "90% / 10% quantile")
 DAYS_HEAD: Final = (
     "recordings",
     "of a day",
@@ -184,6 +195,61 @@ def _rank_cells(ranks: fields.Ranks) -> Row:
     return percent(ranks.all_at_once, ranks.n), percent(ranks.each, ranks.n), f"{ranks.mean_width:.1f}"
 
 
+def rare_rows(n: int) -> Iterator[Row]:
+    """How often intervals hold where errors are rare; 700 recordings."""
+    for n_expected in (1, 3, 6, 10, 20, 50, 200):
+        result = rare.rare(
+            n_expected,
+            n_recordings=700,
+            n=n // 6,
+            n_flips=N_SIGN_FLIPS,
+            n_resamples=N_RESAMPLES,
+            rng=np.random.default_rng(n_expected),
+        )
+        shown = (round(share * result.n) for share in (result.mean_shown, result.difference_shown))
+        cells = [
+            percent(result.mean_shown, result.n),
+            percent(result.mean, next(shown)),
+            percent(result.difference_shown, result.n),
+            percent(result.difference, next(shown)),
+            percent(result.power, result.n),
+        ]
+        yield n_expected, *cells
+
+
+def papers_rows(n: int) -> Iterator[Row]:
+    """How often all ranges of 8 equal methods hold if papers' values come from the same recordings."""
+    for n_recordings, rho in itertools.product((40, 150), fields.SHARED):
+        rng = np.random.default_rng([n_recordings, int(10 * rho)])
+        share = fields.all_hold_beside_sampled_papers(
+            n_methods=8, n_papers=2, n_recordings=n_recordings, correlation=rho, n=n // 6, rng=rng
+        )
+        yield n_recordings, rho, percent(share, n // 6)
+
+
+def failing_rows(n: int) -> Iterator[Row]:
+    """What failures in 2% of recordings do, where they are very bad."""
+    for times, n_recordings in itertools.product((10.0, 25.0), (40, 150, 700)):
+        model = worlds.failing_model(share=0.02, times=times)
+        n_here = n // 12 if n_recordings == max(N_RECORDINGS) else n // 3
+        shares = coverage_of(model, n_recordings, n=n_here).shown
+        cells = (shares.of_means[1], shares.below_5_percent, shares.up_to_1_permille)
+        yield model, n_recordings, *(percent(cell, shares.n) for cell in cells)
+
+
+def detectable_rows(n: int) -> Iterator[Row]:
+    """How often the detectable difference is found."""
+    for name, n_recordings in itertools.product(detectable.SHAPES, (50, 150)):
+        result = detectable.detectable(
+            name,
+            n_recordings=n_recordings,
+            n=n // 3,
+            n_flips=N_SIGN_FLIPS,
+            rng=np.random.default_rng([n_recordings, *name.encode()]),
+        )
+        yield name, n_recordings, percent(result.power, result.n), f"{result.ratio:.1f}"
+
+
 def days_rows(n: int) -> Iterator[Row]:
     """The same shares where recordings of one day are alike, with recordings and with days as units."""
     for n_recordings, per_day, rho in DAYS:
@@ -209,6 +275,10 @@ TABLES: Final[dict[str, tuple[Row, Callable[[int], Iterator[Row]]]]] = {
     "ranks": (RANKS_HEAD, ranks_rows),
     "odd": (RANKS_HEAD, odd_rows),
     "dominated": (DOMINATED_HEAD, dominated_rows),
+    "rare": (RARE_HEAD, rare_rows),
+    "papers": (PAPERS_HEAD, papers_rows),
+    "failing": (FAILING_HEAD, failing_rows),
+    "detectable": (DETECTABLE_HEAD, detectable_rows),
     "days": (DAYS_HEAD, days_rows),
 }
 

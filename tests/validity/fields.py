@@ -94,6 +94,27 @@ def ranks_of(
     return Ranks(n_all / n, n_each / n, width / n, n_marked / n, n)
 
 
+def all_hold_beside_sampled_papers(
+    *, n_methods: int, n_papers: int, n_recordings: int, correlation: float, n: int, rng: np.random.Generator
+) -> float:
+    """How often all ranges hold next to papers whose values are means over the same recordings."""
+    model, shared = error_models.MODELS[0], SHARED[correlation]
+    n_all = 0
+    for chunk in chunks(n):
+        sums, counts = _field(model, n_methods + n_papers, n_recordings, chunk, shared, rng)
+        means = sums.sum(axis=1) / counts.sum(axis=0)
+        computed = ranges.rank_ranges(
+            sums[:n_methods],
+            published=means[:n_methods],
+            usable=np.ones(chunk, dtype=np.bool_),
+            rng=rng,
+            quoted=ranges.Quoted(means[n_methods:], np.zeros((n_papers, chunk)), counts),
+        )
+        is_all = (computed.low == 1) & (computed.high == n_methods + n_papers)
+        n_all += int(is_all.all(axis=0).sum())
+    return n_all / n
+
+
 def _quoted(value: float, counts: Floats) -> ranges.Quoted:
     """A quoted row of this value, exactly known, in every column."""
     shape = (1, counts.shape[1])

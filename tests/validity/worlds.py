@@ -11,7 +11,7 @@ from tests.validity.fields import Draw
 
 Floats = NDArray[np.float64]
 # As unequal as the real test set's recordings, about: log-normal, σ = 0.4.
-_LENGTHS: Final = np.round(
+LENGTHS: Final = np.round(
     [40 * np.exp(0.4 * NormalDist().inv_cdf((i + 0.5) / 10_000)) for i in range(10_000)]
 )
 # Of the logarithm of a recording's level.
@@ -34,7 +34,7 @@ def in_days(per_day: int, rho: float, *, n_methods: int) -> Draw:
     """
 
     def draw(n_recordings: int, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-        counts = _LENGTHS[rng.integers(0, len(_LENGTHS), size=(n_recordings, n))]
+        counts = LENGTHS[rng.integers(0, len(LENGTHS), size=(n_recordings, n))]
         n_days = -(-n_recordings // per_day)
         of_day = rng.standard_normal((n_methods, n_days, n)).repeat(per_day, axis=1)[:, :n_recordings]
         own = rng.standard_normal((n_methods, n_recordings, n))
@@ -60,6 +60,18 @@ def dominated(*, n_methods: int, worse: float | None = None) -> Draw:
         return sums, counts
 
     return draw
+
+
+def failing_model(*, share: float, times: float) -> Model:
+    """Two methods of one mean; in a `share` of recordings the second's error is `times` as large."""
+    alike = in_days(1, 0.0, n_methods=2)
+
+    def both(n_recordings: int, n: int, rng: np.random.Generator) -> Drawn:
+        (first, second), counts = alike(n_recordings, n, rng)
+        fails = rng.random(counts.shape) < share
+        return Drawn(counts, first, second * np.where(fails, times, 1.0) / (1 + share * (times - 1)))
+
+    return Model(f"{share:.0%} × {times:g}", "one fails rarely and very badly", lambda: 1.0, both)
 
 
 def day_model(per_day: int, rho: float) -> Model:
