@@ -9,13 +9,13 @@ from django.http import QueryDict
 from django.shortcuts import get_object_or_404
 from django.utils import timezone
 from drf_spectacular.utils import OpenApiResponse, extend_schema
-from rest_framework.parsers import MultiPartParser
 from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
 from leaderboard.api import pagination
 from leaderboard.api.authentication import require_split, split_of
+from leaderboard.api.parsers import SingleMultiPartParser
 from leaderboard.api.schema import errors, response_header
 from leaderboard.api.serializers import absolute
 from leaderboard.api.submission_serializers import (
@@ -38,7 +38,7 @@ EVALUATIONS = Evaluation.objects.select_related("edition__ground_truth").prefetc
 
 
 class SubmissionsView(APIView):
-    parser_classes = [MultiPartParser]
+    parser_classes = [SingleMultiPartParser]
     throttle_classes = [*APIView.throttle_classes, SubmitThrottle]
 
     @extend_schema(

@@ -13,6 +13,7 @@ API_GROUPS: Final[dict[str, dict[str, str]]] = {
     "The request itself": {
         "bad-request": "The request is malformed or incomplete.",
         "parse-error": "The body is not what its Content-Type says.",
+        "doubled-field": "The request has a field more than once.",
         "invalid": "A field of the request has an invalid value.",
         "bad-limit": "`limit` is not a number of rows that a page may have.",
         "bad-cursor": "`after` names no row of this list.",

@@ -78,11 +78,13 @@ class Submitted:
 def submit(request: SubmissionRequest) -> Submitted:
     """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
 
-    The same bytes for the same split, method and manifest return the first submission. Details that differ
-    replace the method's; without `may_edit` they are refused. Raises `Refused` or `usage.QuotaExceeded`;
-    nothing is kept then.
+    The same bytes for the same split, method and manifest return the first submission, also once the split
+    takes nothing more. Details that differ replace the method's; without `may_edit` they are refused. Raises
+    `Refused` or `usage.QuotaExceeded`; nothing is kept then.
     """
-    split = _open_split(request.split_name, now=request.now)
+    split = shown_split(request.split_name)
+    if split.current_edition is None:
+        _require_open(split, now=request.now)
     request = request.cleaned()
     upload = _checked(request.upload)
     file = files.measure(upload)
@@ -117,15 +119,16 @@ class _Answers(NamedTuple):
 def _answers(
     request: SubmissionRequest, file: files.StoredFile, *, split: Split, team: Team | None
 ) -> _Answers:
-    """Check a file in this order: admission, same bytes, quota, changes, name.
+    """Check a file in this order: same bytes, opening, admission, quota, changes, name.
 
     Runs twice: before the bytes are written, to spare the disk, and under locks. Raises as `submit`.
     """
-    admissions.require(team=team, split=split)
     method = Method.objects.existing().filter(team=team, name=request.method_name).first()
     sent_before = _sent_before(file, split=split, method=method) if method else None
     if sent_before is not None:
         return _Answers(method, sent_before, {})
+    _require_open(split, now=request.now)
+    admissions.require(team=team, split=split)
     usage.require(team=team, user=request.user, split=split, size_bytes=file.size_bytes, now=request.now)
     changes = request.changes_of(method)
     if method is None and team is not None:
@@ -180,12 +183,10 @@ def _queue(submission: Submission, *, split: Split) -> None:
         lifecycle.enqueue(submission=submission, edition=edition)
 
 
-def _open_split(name: str, *, now: datetime) -> Split:
-    split = shown_split(name)
+def _require_open(split: Split, *, now: datetime) -> None:
     refusal = admissions.refusal_for_all(split, now=now)
     if refusal is not None:
         raise refusal
-    return split
 
 
 def _token_split(method: Method, changes: Mapping[str, str]) -> Refused:

@@ -48,7 +48,7 @@ class Call:
             parts[0] = f'curl -X {self.method} "{site}{self.target}"'
         if self.has_token:
             parts.append(f'-H "Authorization: Bearer {self.bearer}"')
-        parts += [f"-F {name}='{text}'" for name, text in (self.form or {}).items()]
+        parts += [f"--form-string {name}='{text}'" for name, text in (self.form or {}).items()]
         if self.has_file:
             parts.append("-F file=@predictions.json")
         if self.body is not None:

@@ -1,9 +1,12 @@
 """The API's submissions: the fields that CI jobs rely on."""
 
 import json
+from datetime import timedelta
 
 import pytest
 from django.core.files.uploadedfile import SimpleUploadedFile
+from django.test import Client
+from django.utils import timezone
 from rest_framework.test import APIClient
 
 from evaluator.metrics.protocol import SCORE_NAMES
@@ -107,3 +110,60 @@ def test_the_same_bytes_are_one_submission_and_cost_nothing_again(edition: Editi
     assert (first.status_code, again.status_code) == (201, 200)
     assert (first.json()["id"], first.headers["Location"]) == (again.json()["id"], again.headers["Location"])
     assert again.json()["quota"]
+
+
+@pytest.mark.parametrize("change", ["deadline", "archived", "admission", "quota"])
+def test_the_same_bytes_are_answered_with_the_first_submission_when_nothing_more_is_taken(
+    signed_in: Client, edition: Edition, owner: User, teammate: User, change: str
+) -> None:
+    data = builders.predictions(edition)
+    clients = [client_of(owner), client_of(teammate)]
+    first = post(clients[0], data).json()
+    past = timezone.now() - timedelta(seconds=1)
+    changes = {
+        "deadline": {"closes_at": past},
+        "archived": {"listing": "ARCHIVED"},
+        "admission": {"needs_admission": True},
+        "quota": {"quota_limit": 1},
+    }
+    Split.objects.filter(pk="test").update(**changes[change])
+    for client in clients:
+        again = post(client, data)
+        assert (again.status_code, again.json()["id"]) == (200, first["id"])
+        for other in ({"data": builders.predictions(edition, factor=1.2)}, {"data": data, "method": "Bar"}):
+            assert post(client, **other).status_code in {403, 409, 429}
+    page = signed_in.post(
+        "/submit/", {"split": "test", "method": "Foo", "file": SimpleUploadedFile("p.json", data)}
+    )
+    assert (page.status_code, page.headers["Location"]) == (302, f"/submissions/{first['id']}/")
+    assert Submission.objects.count() == 1
+
+
+@pytest.mark.parametrize("name", ["file", "split", "method", "note", "commit", "paper_url", "unknown"])
+@pytest.mark.parametrize("kind", ["texts", "files", "both"])
+def test_a_field_that_comes_twice_is_refused_by_name(
+    edition: Edition, owner: User, name: str, kind: str
+) -> None:
+    data = builders.predictions(edition)
+    twice = {
+        "texts": ["a", "b"],
+        "files": [SimpleUploadedFile("a", data), SimpleUploadedFile("b", data)],
+        "both": ["a", SimpleUploadedFile("b", data)],
+    }
+    form = {"split": "test", "method": "Foo", "file": SimpleUploadedFile("p.json", data), name: twice[kind]}
+    response = client_of(owner).post("/api/v1/submissions", form, format="multipart")
+    [problem] = response.json()["problems"]
+    assert (response.status_code, problem["code"], problem["where"]) == (422, "doubled-field", name)
+    assert f"has the field '{name}' 2 times; expected it once" in problem["message"]
+    assert not Submission.objects.exists()
+
+
+@pytest.mark.parametrize("body", ['{"name": "A", "name": "B"}', '{"note": {"a": 1, "a": 1}, "name": "B"}'])
+def test_a_json_body_that_names_a_field_twice_changes_nothing(
+    edition: Edition, owner: User, body: str
+) -> None:
+    client = client_of(owner)
+    method = post(client, builders.predictions(edition)).json()["method_id"]
+    response = client.patch(f"/api/v1/methods/{method}", body, content_type="application/json")
+    assert (response.status_code, response.json()["code"]) == (422, "doubled-field")
+    assert Method.objects.get().name == "Foo"
