@@ -336,8 +336,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--readouts", type=int, default=0)
+    parser.add_argument("--chosen", type=int, nargs="*", help="how many sequences; above 12 takes an hour")
     options = parser.parse_args()
-    chosen = (8,) if options.quick else (8, 12)
+    chosen = options.chosen or ((8,) if options.quick else (8, 12))
     n_readouts = options.readouts or (3 if options.quick else 12)
     for (n_sequences, n_recordings), n_chosen, base in itertools.product(
         ((4_000, 100), (28_600, 400)), chosen, BASES
