@@ -17,6 +17,7 @@ class Exit(IntEnum):
     SYSTEM = 7
     REFUSED = 8
     TIMEOUT = 9
+    UNCONFIRMED = 10
     INTERRUPTED = 130
 
 
@@ -31,6 +32,7 @@ MEANINGS: Final[dict[Exit, str]] = {
     Exit.SYSTEM: "the server failed; this is not your fault",
     Exit.REFUSED: "the server refused: not found, not open, cancelled",
     Exit.TIMEOUT: "not finished within --timeout; the evaluation continues",
+    Exit.UNCONFIRMED: "not confirmed (--yes): the file has a warning, or a new method a name like another",
     Exit.INTERRUPTED: "interrupted with Ctrl-C",
 }
 """Every code in words, as docs/cli.md has them."""

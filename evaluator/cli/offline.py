@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from evaluator.cli.connection import connect
+from evaluator.cli.exits import Exit
 from evaluator.cli.failures import echo_json
 from evaluator.cli.options import json_option, output_option, predictions_argument, site_options, slug
 from evaluator.cli.reading import FOLDER, TABLE, name_of, naming, predictions_of, write_bytes
@@ -41,8 +42,16 @@ if TYPE_CHECKING:
     metavar="FOLDER",
     help="The annotation folder of the toolkit: also check its numbering against the manifest.",
 )
+@click.option("--strict", is_flag=True, help="Exit with code 1 if there is a warning.")
 @json_option
-def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | None, as_json: bool) -> None:
+def check(
+    *,
+    predictions: Path,
+    manifest_path: Path | None,
+    annotations: Path | None,
+    strict: bool,
+    as_json: bool,
+) -> None:
     """Check whether PREDICTIONS, a prediction file or - for standard input, is complete and well-formed.
 
     The command uses the rules of the server and sends nothing. A warning is not an error: the values probably
@@ -63,6 +72,7 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
     if numbering is not None and annotations is not None:
         warnings += numbering_warnings(numbering, parsed, predictions=predictions, annotations=annotations)
     n_infinite = sum(map(math.isinf, parsed.ttc_s.tolist()))
+    exit_code = Exit.REJECTED if strict and warnings else Exit.GOOD
     if as_json:
         echo_json(
             {
@@ -75,7 +85,7 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
                 "warnings": [asdict(warning) for warning in warnings],
             }
         )
-        return
+        click.get_current_context().exit(exit_code)
     good = "well-formed" if warnings else "good"
     n_predicted = counted(sequences.n_sequences, "sequence")
     click.echo(f"{name_of(predictions)} is {good}: {n_predicted}, each predicted once.")
@@ -84,6 +94,7 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
     if numbering is not None:
         click.echo(numbering_in_words(numbering))
     echo_warnings(warnings)
+    click.get_current_context().exit(exit_code)
 
 
 def _sequences(manifest_path: Path | None, annotations: Path | None) -> tuple[Manifest, Numbering | None]:

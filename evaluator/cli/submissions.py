@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -11,7 +10,7 @@ from urllib.parse import urljoin
 
 import click
 
-from evaluator.cli import gates
+from evaluator.cli import consent, gates
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, rejected
@@ -29,7 +28,8 @@ from evaluator.cli.reading import name_of, predictions_of
 from evaluator.cli.summaries import summarised
 from evaluator.cli.values import in_short, state_in_words
 from evaluator.cli.warnings_in_words import echo_warnings
-from evaluator.problems import Rejected, n_problems_in_words
+from evaluator.problems import FileWarning, Rejected, n_problems_in_words
+from evaluator.spelling import similar_name
 
 if TYPE_CHECKING:
     from evaluator.client.answers import BoardEntry, Submission
@@ -66,7 +66,11 @@ _NOT_COUNTED: Final = "This file was not scored and did not count against your q
     metavar="METHOD",
     help="Exit with code 6 if the score that ranks is worse than that of this method on the board.",
 )
-@click.option("--yes", is_flag=True, help="Do not ask before the results of a public method go public.")
+@click.option(
+    "--yes",
+    is_flag=True,
+    help="Do not ask: submit despite warnings or a name like another one, and let results go public.",
+)
 @click.option("--no-check", is_flag=True, help="Submit without checking the file first.")
 @click.option(
     "--summary",
@@ -96,7 +100,9 @@ def submit(
     """Submit PREDICTIONS, a prediction file or - for standard input, to the leaderboard.
 
     The command first checks the file with the code of the server. Submitting the same file again is safe:
-    the server answers with the first submission. If the method is public or anonymous, the command says so
+    the server answers with the first submission. If the check gives a warning, or if the method is new and
+    its name is like that of another method of your team, the command asks on a terminal; in a job it submits
+    nothing without --yes and exits with code 10. If the method is public or anonymous, the command says so
     before it submits, and asks on a terminal. A gate (--fail-if…) waits for the scores like --wait.
 
     \b
@@ -111,16 +117,13 @@ def submit(
         connect(url, with_token=True, timeout_s=timeout_s) as client,
     ):
         data = predictions_of(predictions)
-        warned = frozenset[str]()
-        if not no_check:
-            warned = _require_good(client, data, split=split, path=predictions)
+        warnings = [] if no_check else _require_good(client, data, split=split, path=predictions)
         rival = None
         if worse_than:
             rival = gates.rival(client, split=split, method=worse_than, own=method)
-        notice = _notice_of(client, method)
+        notice, similar = _about_method(client, method)
         _warn(notice, err=as_json)
-        if notice and not yes and sys.stdin.isatty() and not click.confirm("Submit?", err=True):
-            raise Failure("Nothing was submitted.", exit_code=Exit.USAGE, code="not-confirmed")
+        consent.require(consent.Doubts(warnings=warnings, similar_method=similar), notice=notice, yes=yes)
         submission = client.submit(
             data,
             filename=_name_to_send(predictions),
@@ -137,6 +140,7 @@ def submit(
         if is_waiting and not submission.is_final:
             submission = summary.submission = _followed(client, submission.id, timeout_s=timeout_s)
         summary.verdicts = _verdicts(submission, fail_if, rival)
+        warned = frozenset(warning.code for warning in warnings)
         conclude(submission, as_json=as_json, verdicts=summary.verdicts, warned=warned)
         if submission.is_new and submission.visibility == "PRIVATE" and not as_json:
             name = printable(submission.method)
@@ -206,8 +210,8 @@ def _latest(client: Client) -> str:
     return submission.id
 
 
-def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> frozenset[str]:
-    """Print the warnings of a file and return their codes; raises Failure for a faulty file."""
+def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> list[FileWarning]:
+    """Print the warnings of a file and return them; raises Failure for a faulty file."""
     # The server explains why a split has no manifest.
     from evaluator import read_manifest, read_predictions  # noqa: PLC0415 -- loads numpy
     from evaluator.client.answers import Refused  # noqa: PLC0415 -- loads msgspec
@@ -218,7 +222,7 @@ def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> fro
     except Refused as refused:
         if refused.status != 404:
             raise
-        return frozenset()
+        return []
     try:
         manifest = read_manifest(table)
     except Rejected as fault:
@@ -231,7 +235,7 @@ def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> fro
         raise rejected(name_of(path), worded, hint=hint) from None
     warnings = warnings_of(predictions)
     echo_warnings(warnings)
-    return frozenset(warning.code for warning in warnings)
+    return warnings
 
 
 def _explained(client: Client, data: bytes, fault: Rejected, *, split: str, current: str) -> Rejected:
@@ -265,15 +269,26 @@ def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submis
     return submission
 
 
-def _notice_of(client: Client, method: str) -> str:
-    """Say who will see the scores; empty if only the team does, or the token may not ask."""
+def _about_method(client: Client, method: str) -> tuple[str, str | None]:
+    """Say who will see the scores, and of a new method which own method has a similar name.
+
+    Empty and None if only the team sees them and the name is like no other, or if the token may not ask.
+    """
     from evaluator.client.answers import Refused  # noqa: PLC0415 -- loads msgspec
 
     try:
-        own_method = client.own_method(method)
+        own_methods = list(client.methods())
     except Refused:  # a token that may only submit; the answer to the file says it
-        return ""
-    return own_method.notice if own_method is not None else ""
+        return "", None
+    known = next((row for row in own_methods if method in {row.id, row.name}), None)
+    if known is not None:
+        return known.notice, None
+    similar = similar_name(method, (row.name for row in own_methods))
+    if similar is not None:
+        click.echo(
+            printable(f'Warning: "{method}" would be a new method; your team has "{similar}".'), err=True
+        )
+    return "", similar
 
 
 def _warn(notice: str, *, err: bool) -> None:

@@ -78,7 +78,7 @@ def test_a_warning_of_the_check_is_not_repeated_with_the_scores(
     warning = {"code": "looks-like-ratios", "message": f"{words} scale ratios."}
     site.put(POST, Reply(QUEUED | {"state": "SCORED", "scores": {"mid": 1.0}, "warnings": [warning]}))
     sent = ("submit", path, "--split", "val", "--method", "Foo++")
-    assert tsttc(*sent).stderr.count("Warning: ") == 1
+    assert tsttc(*sent, "--yes").stderr.count("Warning: ") == 1
     assert tsttc(*sent, "--no-check").stderr == f"Warning: {words} scale ratios.\n"
 
 
@@ -123,7 +123,7 @@ def test_a_person_is_asked_before_the_results_of_a_public_method_go_public(
     put_manifest(site)
     site.put(METHODS, Reply([PUBLIC]))
     terminal = SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True))
-    monkeypatch.setattr("evaluator.cli.submissions.sys", terminal)
+    monkeypatch.setattr("evaluator.cli.consent.sys", terminal)
     words = ("submit", EXAMPLES / "predictions.json", "--split", "val", "--method", "Foo++")
     refused = tsttc(*words, stdin=b"n\n")
     assert (refused.exit_code, refused.stdout, site.posts) == (2, f"{NOTICE}\n", [])
@@ -145,3 +145,90 @@ def test_token_that_may_only_submit_learns_from_the_answer_who_sees_the_results(
     site.put(POST, Reply(QUEUED | {"notice": NOTICE}, status=201))
     site.put(METHODS, Reply(problem("Not for reading.", code="token-scope"), status=403))
     assert submit(tsttc).stdout.splitlines()[1] == NOTICE
+
+
+# --- doubts: a slot is not used for a slip ------------------------------------------------------------------
+
+
+def doubtful(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> Path:
+    """A well-formed file whose values are probably of another unit."""
+    monkeypatch.setattr(plausibility, "MIN_VALUES", 10)
+    value = {"milliseconds": 2500.0, "ratios": 0.9, "constant": 3.0}[kind]
+    step = 0.0 if kind == "constant" else value / 1000
+    path = tmp_path / f"{kind}.json"
+    path.write_text(json.dumps({str(row): value + step * row for row in range(60)}))
+    return path
+
+
+def at_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True))
+    monkeypatch.setattr("evaluator.cli.consent.sys", terminal)
+
+
+@pytest.mark.parametrize("kind", ["milliseconds", "ratios", "constant"])
+def test_a_job_sends_no_file_with_a_warning_unless_it_says_yes(
+    tsttc: Tsttc, site: RecordedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    put_manifest(site)
+    path = doubtful(tmp_path, monkeypatch, kind)
+    words = ("submit", path, "--split", "val", "--method", "Foo++")
+    refused = tsttc(*words, "--json")
+    assert (refused.exit_code, site.posts) == (10, [])
+    assert "Warning: " in refused.stderr
+    assert "Nothing was submitted: the file has a warning." in refused.stderr
+    assert "add --yes" in refused.stderr
+    document = json.loads(refused.stdout)
+    assert (document["code"], len(document["warnings"])) == ("not-confirmed", 1)
+    assert tsttc(*words, "--yes").exit_code == 0
+    assert len(site.posts) == 1
+    checked = [tsttc("check", path, "--manifest", MANIFEST, *more) for more in ((), ("--strict",))]
+    assert [result.exit_code for result in checked] == [0, 1]
+    strict = tsttc("check", path, "--manifest", MANIFEST, "--strict", "--json")
+    assert (strict.exit_code, len(json.loads(strict.stdout)["warnings"])) == (1, 1)
+
+
+@pytest.mark.parametrize(("answer", "exit_code", "n_sent"), [(b"\n", 10, 0), (b"n\n", 10, 0), (b"y\n", 0, 1)])
+def test_a_person_is_asked_before_a_file_with_a_warning_is_sent(
+    tsttc: Tsttc,
+    site: RecordedSite,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    answer: bytes,
+    exit_code: int,
+    n_sent: int,
+) -> None:
+    put_manifest(site)
+    path = doubtful(tmp_path, monkeypatch, "milliseconds")
+    at_a_terminal(monkeypatch)
+    result = tsttc("submit", path, "--split", "val", "--method", "Foo++", stdin=answer)
+    assert (result.exit_code, len(site.posts)) == (exit_code, n_sent)
+    assert "Submit anyway? [y/N]: " in result.stderr
+
+
+OWN = [{"id": f"m{number}", "name": name} for number, name in enumerate(["Other", "TTC-Former", "Foo v1"])]
+
+
+@pytest.mark.parametrize("name", ["TTC-Fromer", "ttc former", "TTCFormer", "TTC-Formr"])
+def test_a_new_method_with_a_name_like_another_one_is_asked_about(
+    tsttc: Tsttc, site: RecordedSite, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    put_manifest(site)
+    site.put(METHODS, Reply(OWN))
+    words = ("submit", EXAMPLES / "predictions.json", "--split", "val", "--method", name)
+    refused = tsttc(*words)
+    assert (refused.exit_code, site.posts) == (10, [])
+    assert f'"{name}" would be a new method; your team has "TTC-Former".' in refused.stderr
+    assert tsttc(*words, "--yes").exit_code == 0
+    at_a_terminal(monkeypatch)
+    assert tsttc(*words, stdin=b"n\n").exit_code == 10
+    assert len(site.posts) == 1
+
+
+@pytest.mark.parametrize("name", ["TTC-Former", "m1", "Foo v2", "Foo", "Another"])
+def test_a_method_of_the_team_or_another_version_is_no_slip(
+    tsttc: Tsttc, site: RecordedSite, name: str
+) -> None:
+    put_manifest(site)
+    site.put(METHODS, Reply(OWN))
+    result = tsttc("submit", EXAMPLES / "predictions.json", "--split", "val", "--method", name)
+    assert (result.exit_code, len(site.posts)) == (0, 1)
