@@ -78,7 +78,7 @@ def test_the_owner_sees_what_a_plain_loop_finds(sent: Submission, val: Edition, 
 def test_missed_warnings_and_false_alarms_are_what_a_plain_loop_counts(val: Edition, owner: User) -> None:
     truth = truth_values.load(val.ground_truth_id)
     # Multiples of the truth on both sides of it, and some with the other sign.
-    predicted_s = truth.ttc_s * np.resize([1.5, 0.7, 1.0, -1.0], truth.n_sequences)
+    predicted_s = truth.ttc_s * np.resize([1.5, 0.3, 0.1, -1.0], truth.n_sequences)
     predictions = evaluator.Predictions.from_arrays(ttc_s=predicted_s, manifest=truth.manifest)
     content = analyses.content_of(predictions, truth, rules=get_protocol("tsttc-2"))
     report = evaluator.evaluate(predictions, truth, protocol="tsttc-2", keep_sequences=True)
