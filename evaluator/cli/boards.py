@@ -17,6 +17,7 @@ from evaluator.cli.values import authors_or_team, overall_of, texts_of
 from evaluator.metrics.protocol import known_names, primary_of
 from evaluator.tables import layouts
 from evaluator.tables.formats import FORMATS
+from evaluator.units import RECORDING
 
 if TYPE_CHECKING:
     from evaluator.client.answers import Board, BoardEntry
@@ -133,7 +134,7 @@ def in_words(board: Board, *, width: int | None) -> Iterator[str]:
     yield from lines
     if any(entry.intervals for entry in board.entries):
         yield ""
-        yield layouts.brackets(board.unit, board.n_units)
+        yield layouts.brackets(board.unit or RECORDING, board.n_units)
     if board.floor:
         from evaluator.scoring.scores import floor_sentence  # noqa: PLC0415 -- loads numpy
 

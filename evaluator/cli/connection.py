@@ -194,7 +194,7 @@ def _hint_for(error: Refused, *, url: str) -> str:
         return f"Create a token at {url.rstrip('/')}/tokens/, then: tsttc login, or set {TOKEN_VARIABLE}."
     if error.status == 403 and error.code in TOKENS_INSTEAD:
         return f"{TOKENS_INSTEAD[error.code]} at {url.rstrip('/')}/tokens/"
-    if error.status == 404:
+    if error.status == 404 and error.code != "no-ground-truth":
         return "Check the name, or the id, and --server."
     if error.status == 429:
         return again or "Show your quota with: tsttc quota"

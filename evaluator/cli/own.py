@@ -43,7 +43,8 @@ def whoami(*, url: str, as_json: bool) -> None:
     moment = account.expires_at
     end = f"until {moment[:16].replace('T', ' ')} UTC" if moment else "without an end"
     click.echo(printable(f"{team} at {url.rstrip('/')}"))
-    click.echo(printable(f'token "{account.token}": {", ".join(account.scopes)}{limit}, {end}'))
+    name = "session of a browser" if account.token is None else f'token "{account.token}"'
+    click.echo(printable(f'{name}: {", ".join(account.scopes)}{limit}, {end}'))
 
 
 @click.command(short_help="List the methods of your team.")

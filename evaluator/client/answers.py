@@ -77,7 +77,7 @@ class Account(msgspec.Struct, frozen=True, kw_only=True):
     """The owner of a token; without a `split` it is valid for all."""
 
     team: str | None
-    token: str
+    token: str | None
     scopes: list[str]
     document: JSON
     split: str | None = None
@@ -122,7 +122,7 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
     """The ranked entries of a split in an edition.
 
     `floor` are the ground truth's own scores, `unit` and `n_units` the independent units of intervals and
-    ranks.
+    ranks; they and `edition` are None before the first edition.
     """
 
     split: str
@@ -130,7 +130,7 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
     document: JSON
     edition: Any = None
     decimals: int | None = None
-    unit: str = RECORDING
+    unit: str | None = RECORDING
     n_units: int | None = None
     floor: dict[str, float | None] | None = None
     updated_at: str | None = None

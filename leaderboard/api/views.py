@@ -18,6 +18,7 @@ from leaderboard.api.serializers import SplitSerializer
 from leaderboard.api.submission_serializers import SubmissionSerializer
 from leaderboard.boards import snapshots
 from leaderboard.editions import history
+from leaderboard.errors.refusals import Refused
 from leaderboard.exports import croissant
 from leaderboard.http_caching import is_known
 from leaderboard.models import Edition, Split, Submission, User
@@ -46,6 +47,11 @@ def current_split(request: Request, name: str) -> Split:
 def published_edition(split: str | Split, number: int) -> Edition:
     """Return a published edition. Raises `Http404`."""
     return get_object_or_404(snapshots.editions(), split=split, number=number)
+
+
+def no_ground_truth(split: Split) -> Refused:
+    """Say why a split without an edition has no manifest."""
+    return Refused("no-ground-truth", f"{split.name} has no ground truth yet, so it has no manifest.")
 
 
 class WithdrawView(APIView):
@@ -90,7 +96,10 @@ class ManifestView(APIView):
         """All columns of the ground truth but the time to contact, as CSV."""
         rows = Split.objects.shown().select_related("current_edition__ground_truth")
         row = get_object_or_404(rows, pk=split)
-        digest = history.manifest_digest(split=row, number=request.GET.get("edition", ""))
+        number = request.GET.get("edition", "")
+        if not number and row.current_edition is None:
+            raise no_ground_truth(row)
+        digest = history.manifest_digest(split=row, number=number)
         if digest is None:
             raise Http404
         tag = {"ETag": f'"{digest}"'}
@@ -118,8 +127,9 @@ class CroissantView(APIView):
     def get(self, request: Request, split: str) -> JsonResponse:
         """The manifest as Croissant 1.1 (JSON-LD), which programs can find and load."""
         text = request.query_params.get("edition")
-        current = current_split(request, split).current_edition
+        row = current_split(request, split)
+        current = row.current_edition
         edition = published_edition(split, edition_number(text)) if text is not None else current
         if edition is None:
-            raise Http404
+            raise no_ground_truth(row)
         return JsonResponse(croissant.document(edition), content_type=croissant.MEDIA_TYPE)

@@ -23,6 +23,7 @@ API_GROUPS: Final[dict[str, dict[str, str]]] = {
         "bad-filter": "A filter of the board has an invalid value.",
         "unknown-column": "The board has no such column to sort by.",
         "not-found": "There is nothing at this address that you may see.",
+        "no-ground-truth": "The split has no ground truth yet, so it has no manifest.",
         "method-not-allowed": "The path does not support this HTTP method; `Allow` lists those it does.",
         "not-acceptable": "`Accept` asks for a format that this path does not offer.",
         "unsupported-media-type": "The Content-Type of the body is not accepted here.",
@@ -111,7 +112,7 @@ _CODES_BY_STATUS: Final[dict[int, str]] = {
     401: "not-authenticated authentication-failed token-malformed token-unknown token-expired token-revoked "
     "account-closed",
     403: "https-required token-scope token-split not-admitted permission-denied not-maintainer",
-    404: "not-found not-on-the-board edition-unknown",
+    404: "not-found no-ground-truth not-on-the-board edition-unknown",
     405: "method-not-allowed",
     406: "not-acceptable",
     409: "split-not-open split-closed not-scored withdrawn edition-refused",

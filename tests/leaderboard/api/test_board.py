@@ -41,7 +41,10 @@ def test_board_of_a_closed_split_has_its_published_rows(benchmark: None, client:
     [
         ("/api/v1/splits/test/board?sort=colour", 400, "unknown-column"),
         ("/api/v1/splits/nope/board", 404, "not-found"),
-        ("/api/v1/splits/val/manifest", 404, "not-found"),
+        ("/api/v1/splits/nope/manifest", 404, "not-found"),
+        ("/api/v1/splits/val/manifest", 404, "no-ground-truth"),
+        ("/api/v1/splits/val/manifest?edition=1", 404, "not-found"),
+        ("/api/v1/splits/val/croissant", 404, "no-ground-truth"),
         ("/api/v1/splits/test%00/board", 404, None),
     ],
 )
