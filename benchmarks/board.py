@@ -11,7 +11,7 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
 
-import httpx
+import httpx2
 
 from benchmarks._site import QUICK, processor_s, site
 from tests.journeys.production import web_process
@@ -31,7 +31,7 @@ def main() -> None:
     with site(WEB_CONCURRENCY="1", TSTTC_LOG_LEVEL="WARNING") as made:
         edition, user = prepare(made.directory)
         n_before = 0
-        with web_process(made) as process, httpx.Client(base_url=made.url, trust_env=False) as http:
+        with web_process(made) as process, httpx2.Client(base_url=made.url, trust_env=False) as http:
             for n in N_ENTRIES:
                 fill(edition, n=n - n_before, user=user)
                 n_before = n
@@ -74,7 +74,7 @@ def change() -> None:
         board_versions.bump("test")
 
 
-def first_reader_s(http: httpx.Client) -> float:
+def first_reader_s(http: httpx2.Client) -> float:
     """The time of the page and the JSON for the first reader after a change, the longer of both."""
     taken_s = []
     for address in [ADDRESSES["page"], ADDRESSES["json"]]:
@@ -88,7 +88,7 @@ def first_reader_s(http: httpx.Client) -> float:
     return max(taken_s)
 
 
-def compare(http: httpx.Client, pid: int) -> None:
+def compare(http: httpx2.Client, pid: int) -> None:
     """Processor time per answer, in turns."""
     used_s: dict[str, list[float]] = {name: [] for name in ADDRESSES}
     for _ in range(N_ROUNDS):

@@ -11,7 +11,7 @@ import time
 from statistics import median
 from uuid import UUID
 
-import httpx
+import httpx2
 import numpy as np
 
 import evaluator
@@ -34,7 +34,7 @@ def main() -> None:
         rng = np.random.default_rng(SEED)
         with worker(made, n_processes=1) as pid, web_process(made):
             leave_intervals()
-            client = httpx.Client(
+            client = httpx2.Client(
                 base_url=f"{made.url}/api/v1",
                 headers={"Authorization": f"Bearer {token}"},
                 trust_env=False,
@@ -70,7 +70,7 @@ def prepare(made: Site) -> tuple[str, evaluator.GroundTruth]:
     return tokens.create(user=user, name="bench", now=timezone.now()), truth
 
 
-def send(http: httpx.Client, data: bytes) -> str:
+def send(http: httpx2.Client, data: bytes) -> str:
     """Send a file; returns the id of its submission."""
     fields = {"split": "test", "method": "Bench"}
     answer = http.post("/submissions", data=fields, files={"file": ("predictions.json", data)})
@@ -78,7 +78,7 @@ def send(http: httpx.Client, data: bytes) -> str:
     return str(answer.json()["id"])
 
 
-def one_by_one(http: httpx.Client, data: bytes) -> float:
+def one_by_one(http: httpx2.Client, data: bytes) -> float:
     """Seconds from before the POST until the database says that it was scored."""
     from leaderboard.models import Evaluation  # noqa: PLC0415
 

@@ -18,7 +18,7 @@ from evaluator.cli.options import NETWORK_TIMEOUT_S, TOKEN_VARIABLE, network_tim
 from evaluator.cli.tokens import token_for
 
 if TYPE_CHECKING:
-    from evaluator.client.answers import ClientError, Refused
+    from evaluator.client.answers import ClientError, NotSecure, Refused
     from evaluator.client.api import Client
 
 # A problem that names one of these is about the command's options; any other is about the file.
@@ -47,11 +47,9 @@ def connect(
     # The site must answer as a leaderboard before the token or a file is sent.
     bearer = token or (token_for(url) if with_token else None)
     from evaluator.client.answers import ClientError, Refused  # noqa: PLC0415 -- loads msgspec
-
-    # httpx brings a command line of its own, with rich and pygments: a third of the time of its import.
-    sys.modules.setdefault("httpx._main", None)  # type: ignore[arg-type]  # None: as if it were not there
-    from evaluator.client.api import LOOPBACK_HOSTS, Client  # noqa: PLC0415 -- loads httpx, which --help can do without
+    from evaluator.client.api import Client  # noqa: PLC0415 -- loads httpx2, which --help can do without
     from evaluator.client.exchange import RetryPolicy  # noqa: PLC0415 -- the same
+    from evaluator.client.surroundings import LOOPBACK_HOSTS  # noqa: PLC0415 -- the same
 
     site = urlsplit(url)
     if bearer and site.scheme == "http" and site.hostname not in LOOPBACK_HOSTS:
@@ -111,7 +109,7 @@ def unknown_split(splits: Sequence[str], *, document: dict[str, Any] | None = No
 
 def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
     """Describe an error of the client and the next step; `hint` is the next step of a refusal."""
-    from evaluator.client.answers import BadAnswer, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- loads msgspec
+    from evaluator.client.answers import BadAnswer, BadSurroundings, NotSecure, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- loads msgspec
 
     refused_hint = hint
     hint = "Check --server (or TSTTC_URL), your network, and whether the server runs."
@@ -120,6 +118,10 @@ def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
     match error:
         case Refused():
             return _refused(error, url=url, hint=refused_hint)
+        case NotSecure():
+            return _not_secure(error)
+        case BadSurroundings():
+            code, words, hint = "bad-surroundings", _sentence(error.reason), error.hint
         case Unreachable(was_connected=False):
             code, words = "unreachable", f"Nothing answers at {error.url} ({error.reason})."
         case Unreachable():
@@ -142,6 +144,18 @@ def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
         case _:
             code, words = "client", _sentence(str(error))
     return Failure(words, exit_code=exit_code, code=code, hint=hint, more=more)
+
+
+def _not_secure(error: NotSecure) -> Failure:
+    words = f"{error.url} answers, but not over TLS ({error.reason})."
+    hint = "Check --server (or TSTTC_URL): a server without TLS has an address with http://."
+    if error.is_untrusted:
+        words = f"This machine does not trust the certificate of {error.url} ({error.reason})."
+        hint = (
+            "Check --server (or TSTTC_URL). If the certificate is of an authority of your own, name the file "
+            "of that authority: export SSL_CERT_FILE=/path/to/ca.pem"
+        )
+    return Failure(words, exit_code=Exit.NETWORK, code="not-secure", hint=hint)
 
 
 def _sentence(text: str) -> str:

@@ -44,7 +44,7 @@ def whoami(*, url: str, as_json: bool) -> None:
     end = f"until {moment[:16].replace('T', ' ')} UTC" if moment else "without an end"
     click.echo(printable(f"{team} at {url.rstrip('/')}"))
     name = "session of a browser" if account.token is None else f'token "{account.token}"'
-    click.echo(printable(f'{name}: {", ".join(account.scopes)}{limit}, {end}'))
+    click.echo(printable(f"{name}: {', '.join(account.scopes)}{limit}, {end}"))
 
 
 @click.command(short_help="List the methods of your team.")

@@ -142,8 +142,9 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def updated(self) -> str:
-        """The time of its last change, to the second; empty if unknown."""
-        return re.sub(r"\.\d+", "", self.updated_at or "")
+        """The time of its last change, to the second, or its day for an anonymous row; empty if unknown."""
+        # The end of a day stands for that day.
+        return re.sub(r"T23:59:59\.999999Z$|\.\d+", "", self.updated_at or "")
 
 
 class RankChange(msgspec.Struct, frozen=True, kw_only=True):
@@ -222,9 +223,29 @@ class Unreachable(ClientError):
     url: str
     reason: str
     was_connected: bool  # whether the server had been reached at all
+    is_lasting: bool = False  # whether the next try would end the same way
 
     def __str__(self) -> str:
         return f"no answer from {self.url}: {self.reason}"
+
+
+@dataclass(kw_only=True, eq=False)
+class NotSecure(Unreachable):
+    """A server that answers, but not over TLS, or with a certificate that this machine does not trust."""
+
+    is_untrusted: bool
+
+
+@dataclass(kw_only=True, eq=False)
+class BadSurroundings(ClientError):
+    """A proxy or certificates that the environment names and nobody can use; `hint` is the next step."""
+
+    url: str
+    reason: str
+    hint: str
+
+    def __str__(self) -> str:
+        return self.reason
 
 
 @dataclass(kw_only=True, eq=False)

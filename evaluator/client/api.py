@@ -11,16 +11,14 @@ Every failure is an `answers.ClientError`. Submitting the same bytes again retur
 from __future__ import annotations
 
 import random
-import ssl
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Self, TypeVar
-from urllib.parse import quote, urlsplit
-from urllib.request import getproxies, proxy_bypass
+from urllib.parse import quote
 
-import httpx
+import httpx2
 
 from evaluator.arguments import Source, data_of
 from evaluator.client.answers import (
@@ -46,22 +44,12 @@ from evaluator.client.exchange import (
     retry_after_s,
     rows,
 )
+from evaluator.client.surroundings import certificates_for, proxy_for, without_password
 
-LOOPBACK_HOSTS = frozenset({"127.0.0.1", "::1", "localhost"})
 T = TypeVar("T")
 
 INTERVALS_WITHIN_S = 10.0
 N_EARLY_LOOKS, EARLY_LOOK_S = 4, 0.2
-
-
-def _proxy_of(url: str) -> str:
-    """Host and port of the proxy that the environment names for this address; empty for none."""
-    site = urlsplit(url)
-    if site.hostname in LOOPBACK_HOSTS or proxy_bypass(site.netloc):
-        return ""
-    proxies = getproxies()
-    address = proxies.get(site.scheme) or proxies.get("all") or ""
-    return address.rpartition("//")[2].rpartition("@")[2].rstrip("/")  # without a password
 
 
 @dataclass(kw_only=True)
@@ -85,13 +73,13 @@ class Client:
         headers = {"User-Agent": self.user_agent, "Accept": "application/json"}
         if self.token:
             headers["Authorization"] = f"Bearer {self.token}"
-        self._http = httpx.Client(
+        self._proxy = proxy_for(self.url)
+        self._http = httpx2.Client(
             headers=headers,
             timeout=self.timeout_s,
-            # Reading all certificates takes 40 ms, so plain HTTP loads none.
-            verify=ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT) if urlsplit(self.url).scheme == "http" else True,
-            # A proxy from the environment never leads to this very machine.
-            trust_env=urlsplit(self.url).hostname not in LOOPBACK_HOSTS,
+            verify=certificates_for(self.url),
+            proxy=self._proxy,
+            trust_env=False,  # `surroundings` has read it
         )
         self._was_answered = False
 
@@ -136,7 +124,7 @@ class Client:
         fields = {"split": split, "method": method, **(details or {})}
         n_sent = 0
 
-        def send() -> httpx.Response:
+        def send() -> httpx2.Response:
             nonlocal n_sent
             n_sent += 1
             return self._http.post(
@@ -147,7 +135,7 @@ class Client:
 
         response = self._retry(send)
         # An earlier try of this very call may have made it, of which only the answer was lost.
-        is_new = n_sent > 1 or response.status_code == httpx.codes.CREATED
+        is_new = n_sent > 1 or response.status_code == httpx2.codes.CREATED
         return one(response, Submission, is_new=is_new)
 
     def submission(self, submission_id: str) -> Submission:
@@ -316,10 +304,10 @@ class Client:
     def _get(self, kind: type[T], *path: str, params: Mapping[str, str] | None = None) -> T:
         return one(self._asked(*path, params=params), kind)
 
-    def _asked(self, *path: str, params: Mapping[str, str] | None = None) -> httpx.Response:
+    def _asked(self, *path: str, params: Mapping[str, str] | None = None) -> httpx2.Response:
         return self._retry(lambda: self._http.get(self._address(*path), params=params))
 
-    def _asked_by_anybody(self, *path: str, accept: str, **query: int) -> httpx.Response:
+    def _asked_by_anybody(self, *path: str, accept: str, **query: int) -> httpx2.Response:
         # Without the token, which may lack the right to read.
         headers = {"Accept": accept}
         request = self._http.build_request("GET", self._address(*path), params=query, headers=headers)
@@ -330,14 +318,15 @@ class Client:
         return "/".join([self.url, "api/v1", *(quote(part, safe="") for part in path)])
 
     def _checked(
-        self, send: Callable[[], httpx.Response], *, timeout_s: float | None = None
-    ) -> httpx.Response:
+        self, send: Callable[[], httpx2.Response], *, timeout_s: float | None = None
+    ) -> httpx2.Response:
         self._http.timeout = timeout_s or self.timeout_s
         try:
             response = checked(send, url=self.url)
         except Unreachable as fault:
             self._was_answered = self._was_answered or fault.was_connected
-            if not fault.was_connected and (proxy := _proxy_of(self.url)):
+            if not fault.was_connected and self._proxy is not None:
+                proxy = without_password(str(self._proxy.url))
                 fault.reason = f"through the proxy {proxy}, which the environment names: {fault.reason}"
             raise
         except Refused:
@@ -346,7 +335,7 @@ class Client:
         self._was_answered = True
         return response
 
-    def _retry(self, send: Callable[[], httpx.Response]) -> httpx.Response:
+    def _retry(self, send: Callable[[], httpx2.Response]) -> httpx2.Response:
         n_failed, until_s = 0, self.monotonic_s() + self.timeout_s
         while True:
             try:
@@ -354,7 +343,11 @@ class Client:
             except (Unreachable, Refused) as fault:
                 n_failed += 1
                 n_tries = self.retry_policy.n_tries if self._was_answered else self.retry_policy.n_first_tries
-                is_lasting = isinstance(fault, Refused) and not self.retry_policy.may_pass(fault)
+                is_lasting = (
+                    not self.retry_policy.may_pass(fault)
+                    if isinstance(fault, Refused)
+                    else fault.is_lasting and not self._was_answered
+                )
                 after_s = fault.retry_after_s if isinstance(fault, Refused) else None
                 delay_s = self.retry_policy.delay_s(n_failed=n_failed, retry_after_s=after_s, rng=self.rng)
                 until_s += after_s or 0.0

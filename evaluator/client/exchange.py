@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Mapping
+import socket
+import ssl
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-import httpx
+import httpx2
 import msgspec
 
-from evaluator.client.answers import BadAnswer, Refused, Unreachable
+from evaluator.client.answers import BadAnswer, NotSecure, Refused, Unreachable
 from evaluator.problems import Problem
 
 T = TypeVar("T")
@@ -39,20 +41,20 @@ class RetryPolicy:
         """Return whether a retry may succeed within a bearable time."""
         if fault.code == QUOTA_EXCEEDED:
             return False
-        if fault.status == httpx.codes.TOO_MANY_REQUESTS and fault.retry_after_s is None:
+        if fault.status == httpx2.codes.TOO_MANY_REQUESTS and fault.retry_after_s is None:
             return False
         is_passing = fault.status in PASSING_STATUSES
         return is_passing and (fault.retry_after_s or 0.0) <= self.longest_retry_after_s
 
 
-def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
+def checked(send: Callable[[], httpx2.Response], *, url: str) -> httpx2.Response:
     try:
         response = send()
-    except (httpx.InvalidURL, UnicodeError) as error:  # a host that no name system could know
-        raise Unreachable(url=url, reason=str(error), was_connected=False) from error
-    except (httpx.ConnectError, httpx.ConnectTimeout, httpx.ProxyError) as error:
-        raise Unreachable(url=url, reason=_reason(error), was_connected=False) from error
-    except (httpx.TransportError, httpx.DecodingError) as error:
+    except (httpx2.InvalidURL, UnicodeError) as error:  # a host that no name system could know
+        raise Unreachable(url=url, reason=str(error), was_connected=False, is_lasting=True) from error
+    except (httpx2.ConnectError, httpx2.ConnectTimeout, httpx2.ProxyError) as error:
+        raise _not_connected(error, url=url) from error
+    except (httpx2.TransportError, httpx2.DecodingError) as error:
         raise Unreachable(url=url, reason=_reason(error), was_connected=True) from error
     if response.is_success:
         return response
@@ -68,13 +70,41 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
     return float(value) if value.isascii() and value.isdigit() else None
 
 
-def _reason(error: httpx.TransportError | httpx.DecodingError) -> str:
-    if isinstance(error, httpx.TimeoutException):
+def _not_connected(error: httpx2.TransportError, *, url: str) -> Unreachable:
+    reason = _reason(error)
+    for cause in _causes(error):
+        match cause:
+            case ssl.SSLCertVerificationError():
+                reason = cause.verify_message or reason
+                return NotSecure(
+                    url=url, reason=reason, was_connected=False, is_lasting=True, is_untrusted=True
+                )
+            case ssl.SSLError():
+                reason = (cause.reason or reason).replace("_", " ").lower()
+                return NotSecure(
+                    url=url, reason=reason, was_connected=False, is_lasting=True, is_untrusted=False
+                )
+            case socket.gaierror():
+                # Another try may help where the name server is away, not where it knows no such name.
+                is_lasting = cause.errno != socket.EAI_AGAIN
+                return Unreachable(url=url, reason=reason, was_connected=False, is_lasting=is_lasting)
+    return Unreachable(url=url, reason=reason, was_connected=False)
+
+
+def _causes(error: BaseException) -> Iterator[BaseException]:
+    cause: BaseException | None = error
+    while cause is not None:
+        yield cause
+        cause = cause.__cause__ or cause.__context__
+
+
+def _reason(error: httpx2.TransportError | httpx2.DecodingError) -> str:
+    if isinstance(error, httpx2.TimeoutException):
         return "it took too long"
     return str(error).strip() or type(error).__name__
 
 
-def _refused(response: httpx.Response) -> Refused:
+def _refused(response: httpx2.Response) -> Refused:
     # Lenient, because a proxy may have written the answer.
     try:
         document = msgspec.json.decode(response.content)
@@ -102,7 +132,7 @@ def _text(value: object) -> str:
     return value if isinstance(value, str) else ""
 
 
-def decoded(response: httpx.Response) -> object:
+def decoded(response: httpx2.Response) -> object:
     try:
         return msgspec.json.decode(response.content)
     except msgspec.DecodeError:
@@ -110,7 +140,7 @@ def decoded(response: httpx.Response) -> object:
         raise BadAnswer(url=str(response.url), content=f"not JSON ({content_type})") from None
 
 
-def one(response: httpx.Response, kind: type[T], **more: object) -> T:
+def one(response: httpx2.Response, kind: type[T], **more: object) -> T:
     """Decode an answer as `kind`, with the JSON as its `document`. Raises BadAnswer."""
     url, document = str(response.url), decoded(response)
     if not isinstance(document, dict):
@@ -118,7 +148,7 @@ def one(response: httpx.Response, kind: type[T], **more: object) -> T:
     return _converted(document, kind, url=url, **more)
 
 
-def rows(response: httpx.Response, kind: type[T]) -> list[T]:
+def rows(response: httpx2.Response, kind: type[T]) -> list[T]:
     """Decode an answer as a list of `kind`. Raises BadAnswer."""
     url, document = str(response.url), decoded(response)
     if not isinstance(document, list):
@@ -126,13 +156,13 @@ def rows(response: httpx.Response, kind: type[T]) -> list[T]:
     return [_converted(row, kind, url=url) for row in document]
 
 
-def next_page(response: httpx.Response) -> Mapping[str, str]:
+def next_page(response: httpx2.Response) -> Mapping[str, str]:
     """Return the query of the next page, empty on the last."""
     # The rest of `Link` is ignored, so that the token stays on this server.
     link = response.links.get("next", {}).get("url", "")
     try:
-        return dict(httpx.URL(link).params)
-    except httpx.InvalidURL:
+        return dict(httpx2.URL(link).params)
+    except httpx2.InvalidURL:
         raise BadAnswer(url=str(response.url), content=f"a next page that is none ({link[:60]})") from None
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, time
 from typing import Final
 
 from evaluator.counting import counted
@@ -83,7 +83,9 @@ def about(origin: Origin) -> tuple[str, ...]:
     if origin.ground_truth:
         lines.append(f"Ground truth {origin.ground_truth}")
     if origin.moment is not None:
-        lines.append(f"As of {origin.moment.astimezone(UTC):%Y-%m-%d %H:%M} UTC")
+        moment = origin.moment.astimezone(UTC)
+        is_day = moment.time() == time.max  # so an anonymous row's day is written
+        lines.append(f"As of {moment:%Y-%m-%d}" if is_day else f"As of {moment:%Y-%m-%d %H:%M} UTC")
     if origin.has_own_rows:
         lines.append(
             "Not public: only one team sees rows marked (private), and other teams see rows marked "

@@ -97,11 +97,6 @@ class Board:
         return len(self.unfiltered)
 
     @property
-    def is_updated_by_day(self) -> bool:
-        """Tell whether only the day of its last change is published, for an anonymous row."""
-        return self.updated_at is not None and self.updated_at.time() == time.max
-
-    @property
     def rules(self) -> Protocol:
         return rules_of(self.edition)
 

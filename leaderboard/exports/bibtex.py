@@ -3,7 +3,7 @@
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from typing import Final
 
 from django.conf import settings
@@ -35,7 +35,7 @@ def references(entries: Iterable[Entry], *, of_board: str = "") -> Iterator[str]
     yield from filter(None, bibtex_by_key.values())
 
 
-def of_edition(edition: Edition, *, address: str, at: datetime | None) -> str:
+def of_edition(edition: Edition, *, address: str, at: datetime | None, visited_on: date | None = None) -> str:
     """Cite the board of an edition as of a time, at a permanent address."""
     name = settings.BENCHMARK.site_name
     site = latex(name)
@@ -48,6 +48,7 @@ def of_edition(edition: Edition, *, address: str, at: datetime | None) -> str:
             "author": f"{{{site}}}",
             "year": f"{at.astimezone(UTC):%Y}" if at else "",
             **_address(address),
+            "urldate": _day(visited_on),
             "note": latex(", ".join(facts)),
         },
     )
@@ -64,7 +65,9 @@ def key_of(entry: Entry) -> str:
     return f"{name}-{entry.method_id.hex[:6] if entry.method_id else ''}"
 
 
-def of_entry(entry: Entry, *, page: str = "", edition: Edition | None = None) -> str:
+def of_entry(
+    entry: Entry, *, page: str = "", edition: Edition | None = None, visited_on: date | None = None
+) -> str:
     """Cite a row: its team and paper; a method without a paper of its own by its `page`."""
     if entry.kind == "published":
         year = str(entry.year or "")
@@ -78,9 +81,14 @@ def of_entry(entry: Entry, *, page: str = "", edition: Edition | None = None) ->
             "author": f"{{{latex(entry.team)}}}",
             "year": f"{entry.date:%Y}" if entry.date else "",
             **_address(_own_paper(entry) or page),
+            "urldate": "" if _own_paper(entry) else _day(visited_on),
             "note": layouts.marked(latex(", ".join([settings.BENCHMARK.site_name, *edition_facts])), mark),
         },
     )
+
+
+def _day(visited_on: date | None) -> str:
+    return visited_on.isoformat() if visited_on else ""
 
 
 def _own_paper(entry: Entry) -> str:

@@ -6,6 +6,7 @@ A row that others see differently says so in every format.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from datetime import date
 from typing import Final
 
 from django.conf import settings
@@ -49,8 +50,15 @@ def offered() -> list[Format]:
 # --- a board ---------------------------------------------------------------------------------------------
 
 
-def export(board: Board, *, address: str, metric: str = "", has_intervals: bool = False) -> Export:
-    """Export all scores of a board, or those of one metric. `address` is permanent."""
+def export(
+    board: Board,
+    *,
+    address: str,
+    metric: str = "",
+    has_intervals: bool = False,
+    visited_on: date | None = None,
+) -> Export:
+    """Export all scores of a board, or those of one metric. `address` is permanent, `visited_on` today."""
     scores, names = board.rules.names_of(metric), board.rules.score_names
     return Export(
         origin=_origin(board, address=address),
@@ -74,7 +82,9 @@ def export(board: Board, *, address: str, metric: str = "", has_intervals: bool 
         records=(_csv_row(entry, has_intervals=has_intervals) for entry in board.entries),
         references=bibtex.references(
             board.entries,
-            of_board=bibtex.of_edition(board.edition, address=address, at=board.at or board.updated_at)
+            of_board=bibtex.of_edition(
+                board.edition, address=address, at=board.at or board.updated_at, visited_on=visited_on
+            )
             if board.edition
             else "",
         ),

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Collection, Iterable
-from datetime import UTC, datetime
+from datetime import UTC, datetime, time
 
 from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
@@ -183,6 +183,8 @@ def clock(at: datetime) -> SafeString:
 
 def _time(at: datetime, pattern: str) -> SafeString:
     at = at.astimezone(UTC)
+    if at.time() == time.max:  # so a day is written whose time is nobody's business
+        return format_html('<time datetime="{0}">{0}</time>', f"{at:%Y-%m-%d}")
     return format_html(
         '<time datetime="{}" title="{}">{}</time>',
         at.isoformat(timespec="seconds"),

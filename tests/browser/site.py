@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
-import httpx
+import httpx2
 import numpy as np
 
 import evaluator
@@ -90,7 +90,7 @@ def predictions(truth: evaluator.GroundTruth, *, factor: float) -> bytes:
 
 def answered_with_pages(site: Site, candidates: Iterable[str], *, cookies: dict[str, str]) -> list[str]:
     """The addresses that answer with a page to a visitor with these cookies."""
-    with httpx.Client(base_url=site.url, timeout=TIMEOUT_S, trust_env=False, cookies=cookies) as client:
+    with httpx2.Client(base_url=site.url, timeout=TIMEOUT_S, trust_env=False, cookies=cookies) as client:
         answers = {address: client.get(address) for address in candidates if not address.endswith(PARTS)}
     return [
         address

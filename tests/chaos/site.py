@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-import httpx
+import httpx2
 
 import evaluator
 from tests.chaos.processes import Process
@@ -64,7 +64,7 @@ class Site:
         """Whether a web process serves at the moment, and the database with it."""
         try:
             return get(f"{self.url}/api/v1/splits").status_code == 200
-        except httpx.TransportError:
+        except httpx2.TransportError:
             return False
 
 

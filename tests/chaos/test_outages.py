@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import httpx
+import httpx2
 import numpy as np
 import pytest
 
@@ -17,7 +17,7 @@ from tests.journeys.production import GUNICORN, TIMEOUT_S, await_that, free_port
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
 FINAL = {"SCORED", "REJECTED", "SYSTEM_ERROR", "CANCELLED"}
-Post = Callable[..., httpx.Response]
+Post = Callable[..., httpx2.Response]
 
 
 @pytest.fixture(scope="module")
@@ -26,13 +26,13 @@ def token(site: Site) -> str:
 
 
 @pytest.fixture
-def http(site: Site, token: str) -> Iterator[httpx.Client]:
+def http(site: Site, token: str) -> Iterator[httpx2.Client]:
     headers = {"Authorization": f"Bearer {token}"}
-    with httpx.Client(base_url=site.url, headers=headers, timeout=TIMEOUT_S, trust_env=False) as client:
+    with httpx2.Client(base_url=site.url, headers=headers, timeout=TIMEOUT_S, trust_env=False) as client:
         yield client
 
 
-def post(http: httpx.Client, data: bytes, *, method: str = "Foo") -> httpx.Response:
+def post(http: httpx2.Client, data: bytes, *, method: str = "Foo") -> httpx2.Response:
     return http.post(
         "/api/v1/submissions",
         data={"split": SPLIT, "method": method},
@@ -52,7 +52,7 @@ def new_file(truth: evaluator.GroundTruth) -> Callable[[], bytes]:
     return make
 
 
-def await_state(http: httpx.Client, answer: httpx.Response) -> str:
+def await_state(http: httpx2.Client, answer: httpx2.Response) -> str:
     """The final state of a submission that was answered with 201."""
     assert answer.status_code == 201, answer.text
     address = f"/api/v1/submissions/{answer.json()['id']}"
@@ -77,7 +77,7 @@ def n_submissions(site: Site) -> int:
 
 
 def test_without_a_broker_files_are_taken_and_scored(
-    site: Site, http: httpx.Client, new_file: Callable[[], bytes]
+    site: Site, http: httpx2.Client, new_file: Callable[[], bytes]
 ) -> None:
     site.redis.server.kill()
     try:
@@ -87,7 +87,7 @@ def test_without_a_broker_files_are_taken_and_scored(
 
 
 def test_with_a_broker_that_hangs_files_are_taken_and_scored(
-    site: Site, http: httpx.Client, new_file: Callable[[], bytes]
+    site: Site, http: httpx2.Client, new_file: Callable[[], bytes]
 ) -> None:
     site.redis.server.send(signal.SIGSTOP)
     try:
@@ -101,7 +101,7 @@ def test_with_a_broker_that_hangs_files_are_taken_and_scored(
 
 
 def test_without_a_database_the_answer_is_503_on_every_door_and_then_all_is_well(
-    site: Site, http: httpx.Client, new_file: Callable[[], bytes]
+    site: Site, http: httpx2.Client, new_file: Callable[[], bytes]
 ) -> None:
     data = new_file()
     assert http.get("/").status_code == 200
@@ -124,7 +124,7 @@ def test_without_a_database_the_answer_is_503_on_every_door_and_then_all_is_well
 
 
 def test_worker_that_is_asked_to_stop_finishes_what_it_has_in_hand(
-    site: Site, http: httpx.Client, new_file: Callable[[], bytes]
+    site: Site, http: httpx2.Client, new_file: Callable[[], bytes]
 ) -> None:
     answers = [post(http, new_file()) for _ in range(6)]
     site.workers[0].ask_to_end()
@@ -158,7 +158,7 @@ def test_full_disk_is_a_507_and_leaves_no_row(
     too_much = new_file() + b" " * 3_000_000
     with (
         another_web(site, **{where: str(tmp_path)}) as url,
-        httpx.Client(base_url=url, timeout=TIMEOUT_S, trust_env=False) as http,
+        httpx2.Client(base_url=url, timeout=TIMEOUT_S, trust_env=False) as http,
     ):
         http.headers["Authorization"] = f"Bearer {token}"
         # gunicorn ends a connection whose body was left unread, and does not say so in the answer: a request

@@ -214,7 +214,7 @@ def test_the_refusal_of_a_dict_names_the_call_that_takes_one(truth: GroundTruth)
 
 WITHOUT_THE_COMMAND = """
 import sys
-for name in ("click", "cryptography", "jwt", "httpx", "keyring", "rich", "pandas", "matplotlib"):
+for name in ("click", "cryptography", "jwt", "httpx2", "keyring", "rich", "pandas", "matplotlib"):
     sys.modules[name] = None
 import evaluator
 truth = evaluator.read_truth("truth.csv")

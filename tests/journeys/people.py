@@ -4,7 +4,7 @@ import html
 import re
 from typing import Any
 
-import httpx
+import httpx2
 
 from tests.journeys.production import TIMEOUT_S, Site, await_that
 
@@ -20,16 +20,18 @@ class Visitor:
     def __init__(self, site: Site) -> None:
         self.site = site
         # Loopback is never reached through a proxy that the environment names.
-        self.http = httpx.Client(base_url=site.url, follow_redirects=True, timeout=TIMEOUT_S, trust_env=False)
+        self.http = httpx2.Client(
+            base_url=site.url, follow_redirects=True, timeout=TIMEOUT_S, trust_env=False
+        )
 
-    def get(self, path: str) -> httpx.Response:
+    def get(self, path: str) -> httpx2.Response:
         answer = self.http.get(path)
         assert answer.status_code < 500, answer.text
         return answer
 
     def post_form(
         self, path: str, fields: dict[str, str], file: tuple[str, bytes] | None = None
-    ) -> httpx.Response:
+    ) -> httpx2.Response:
         """Load the page, fill in its form, send it."""
         page = self.get(path)
         token = re.search(r'name="csrfmiddlewaretoken" value="([^"]+)"', page.text)
@@ -93,7 +95,7 @@ class Program:
     def __init__(self, site: Site, *, email: str) -> None:
         scopes = (f"--scope={scope}" for scope in ("read", "submit", "publish"))
         token = site.manage("create_token", email, "--name", "journey", *scopes).strip()
-        self.http = httpx.Client(
+        self.http = httpx2.Client(
             base_url=site.url,
             headers={"Authorization": f"Bearer {token}"},
             timeout=TIMEOUT_S,

@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import httpx
+import httpx2
 
 from tests.prepared import static_files
 from tests.services import environment_of_its_own, free_port
@@ -37,9 +37,9 @@ def await_that(condition: Callable[[], bool], *, what: str, timeout_s: float = T
         time.sleep(POLL_S)
 
 
-def get(url: str, **headers: str) -> httpx.Response:
+def get(url: str, **headers: str) -> httpx2.Response:
     """The answer at an address, within `TIMEOUT_S`; no proxy is asked on the way."""
-    return httpx.get(url, headers=headers, timeout=TIMEOUT_S, trust_env=False)
+    return httpx2.get(url, headers=headers, timeout=TIMEOUT_S, trust_env=False)
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def _answers(site: Site, name: str) -> bool:
     assert site.processes[name].poll() is None, (site.directory / f"{name}.log").read_text()
     try:
         return get(f"{site.url}/api/v1/splits").status_code == 200
-    except httpx.TransportError:
+    except httpx2.TransportError:
         return False
 
 

@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-import httpx
+import httpx2
 import pytest
 
 from leaderboard.demo.seed import ENTRIES
@@ -133,8 +133,8 @@ def test_the_demo_shows_scored_submissions_survives_a_dead_worker_and_ends_clean
         assert supervisor.wait(timeout=TIMEOUT_S) == 0
         assert not is_alive(first)
         assert not is_alive(second)
-    with pytest.raises(httpx.ConnectError):
-        httpx.get(url, trust_env=False)
+    with pytest.raises(httpx2.ConnectError):
+        httpx2.get(url, trust_env=False)
 
 
 @pytest.mark.parametrize(("host", "others"), [("192.0.2.7", ["192.0.2.7"]), ("fe80::1", ["[fe80::1]"])])

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any
 
-import httpx
+import httpx2
 import numpy as np
 import pytest
 
@@ -138,7 +138,7 @@ class Readers:
         await_that(have_come, what=f"every reader has {n} more answers")
 
     def _read(self, reader: int) -> None:
-        with httpx.Client(base_url=self._site.url, timeout=TIMEOUT_S, trust_env=False) as http:
+        with httpx2.Client(base_url=self._site.url, timeout=TIMEOUT_S, trust_env=False) as http:
             while not self._stopping.is_set():
                 asked_s = time.monotonic()
                 response = http.get(BOARD)
@@ -194,13 +194,13 @@ def test_readers_see_whole_boards_only_and_nothing_is_doubled(
         site.workers[0].start()  # as its supervisor does
         readers.await_answers(2, asked_after_s=time.monotonic())
         await_that(lambda: n_undecided(site) == 0, what="everything is decided in both editions")
-        before = httpx.get(site.url + BOARD, trust_env=False, timeout=TIMEOUT_S).content
+        before = httpx2.get(site.url + BOARD, trust_env=False, timeout=TIMEOUT_S).content
 
         forward = timed(lambda: correct(site, PUBLISH))
         readers.await_answers(3, asked_after_s=forward[1])
         back = timed(lambda: correct(site, ROLL_BACK))
         readers.await_answers(3, asked_after_s=back[1])
-        after = httpx.get(site.url + BOARD, trust_env=False, timeout=TIMEOUT_S).content
+        after = httpx2.get(site.url + BOARD, trust_env=False, timeout=TIMEOUT_S).content
 
     assert n_left > 0, "the worker was killed when all was done"
     assert readers.failures == []

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import httpx
+import httpx2
 import pytest
 
 import evaluator
@@ -44,9 +44,9 @@ class Alone:
     token: str
     good: bytes
 
-    def client(self) -> httpx.Client:
+    def client(self) -> httpx2.Client:
         headers = {"Authorization": f"Bearer {self.token}"}
-        return httpx.Client(base_url=self.site.url, headers=headers, timeout=TIMEOUT_S, trust_env=False)
+        return httpx2.Client(base_url=self.site.url, headers=headers, timeout=TIMEOUT_S, trust_env=False)
 
     def memory_mb(self, what: str) -> float:
         """`VmRSS`: what the process has in memory now; `VmHWM`: the most that it ever had."""
@@ -87,7 +87,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Alone]:
         yield Alone(site=site, pid=int(children[0]), token=token, good=good)
 
 
-def send(client: httpx.Client, data: bytes, *, method: str = "Foo", **fields: str) -> httpx.Response:
+def send(client: httpx2.Client, data: bytes, *, method: str = "Foo", **fields: str) -> httpx2.Response:
     form = {"split": "test", "method": method, **fields}
     files = {"file": ("predictions.json", data, "application/json")}
     return client.post("/api/v1/submissions", data=form, files=files)
@@ -119,7 +119,7 @@ PREFIXES = ("/x", "/board", "//evil.example", "/does-not-fit")
 @pytest.mark.parametrize("name", ["SCRIPT_NAME", "Script-Name", "PATH_INFO", "X-Forwarded-Prefix"])
 def test_no_header_moves_the_site(alone: Alone, name: str) -> None:
     # Without cookies and tokens: what is answered is kept for others. We ask from loopback, as a proxy may.
-    with httpx.Client(base_url=alone.site.url, timeout=TIMEOUT_S, trust_env=False) as client:
+    with httpx2.Client(base_url=alone.site.url, timeout=TIMEOUT_S, trust_env=False) as client:
         for path in ("/", "/board/test/", "/board/test/?sort=-mid", "/docs/", "/api/v1/splits"):
             for prefix in PREFIXES:
                 moved = client.get(path, headers={name: prefix})

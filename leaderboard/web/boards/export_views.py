@@ -4,6 +4,7 @@ They have public rows for every reader, since they end up in papers; `mine=1` ad
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from datetime import date
 from typing import Any, Final
 from urllib.parse import urlencode
 
@@ -71,8 +72,9 @@ def _answer(
     split: Split,
     edition: Edition | None = None,
 ) -> HttpResponse:
+    now = timezone.now()
     try:
-        query = board_query.parse(request.GET, now=timezone.now(), has_time=edition is None)
+        query = board_query.parse(request.GET, now=now, has_time=edition is None)
         has_intervals = tables.is_asked_for("intervals", request.GET.get("intervals", ""))
         is_mine = tables.is_asked_for("mine", request.GET.get("mine", ""))
         if is_mine and not request.user.is_authenticated:
@@ -89,7 +91,11 @@ def _answer(
     except board_query.FAULTS as fault:
         return render(request, "400.html", {"sentence": str(fault)}, status=400)
     export = tables.export(
-        shown, address=address(shown, query), metric=query.columns, has_intervals=has_intervals
+        shown,
+        address=address(shown, query),
+        metric=query.columns,
+        has_intervals=has_intervals,
+        visited_on=now.date(),
     )
     name = f"tsttc-{split.pk}{f'-edition-{shown.edition.number}' if shown.edition else ''}"
     name += f"{'-with-own' if is_mine else ''}.{chosen.suffix}"
@@ -115,14 +121,16 @@ def _asked(query: BoardQuery, **more: str) -> str:
     return f"?{urlencode(given)}" if given else ""
 
 
-def of_method(results: Sequence[Result]) -> dict[str, str]:
+def of_method(results: Sequence[Result], *, visited_on: date) -> dict[str, str]:
     """Return a method's BibTeX and LaTeX, its result for the Hub, and its split: of the first ranked."""
     first = next((result for result in results if result.entry.rank is not None), None)
     if first is None:
         return {}
     page = settings.SITE_URL + reverse("method", args=[first.entry.method_id])
     return {
-        "bibtex": bibtex.of_entry(tables.as_printed(first.entry), page=page, edition=first.edition),
+        "bibtex": bibtex.of_entry(
+            tables.as_printed(first.entry), page=page, edition=first.edition, visited_on=visited_on
+        ),
         "latex_row": tables.latex_row(first.entry),
         "latex_with_intervals": tables.latex_row(first.entry, has_intervals=True)
         if first.entry.intervals

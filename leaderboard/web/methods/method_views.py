@@ -53,7 +53,7 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
         ],
         "table": submission_table(last),
         "board_split": achieved[0].split.pk if achieved else sent_to.pk if sent_to else "",
-        **export_views.of_method(achieved),
+        **export_views.of_method(achieved, visited_on=timezone.now().date()),
     }
     # What is being computed changes by itself.
     is_complete = all(pair.differences is not None for of_result in pairs for pair in of_result)

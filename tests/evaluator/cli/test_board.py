@@ -233,3 +233,20 @@ def test_real_terminal_gets_bold_unless_it_asks_for_none(
     _, shown = on_terminal("board", stream="stdout", COLUMNS="200", **environment)
     assert "Deep Scale" in shown
     assert ("\x1b[1m14.8\x1b[0m" in shown) is is_styled
+
+
+def test_board_before_the_first_edition_is_shown(tsttc: Tsttc, site: RecordedSite) -> None:
+    nothing = ("edition", "protocol", "decimals", "ground_truth", "unit", "n_units", "floor", "updated_at")
+    site.put(
+        BOARD, Reply(BOARD_DOCUMENT | dict.fromkeys(nothing) | {"entries": BOARD_DOCUMENT["entries"][:1]})
+    )
+    result = tsttc("board")
+    assert result.exit_code == 0, result.stderr
+    assert result.output.startswith("test\n")
+    assert "Deep Scale" in result.output
+    assert json.loads(tsttc("board", "--json").output)["unit"] is None
+
+
+def test_a_change_that_is_published_by_day_is_shown_by_day(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put(BOARD, Reply(BOARD_DOCUMENT | {"updated_at": "2026-11-28T23:59:59.999999Z"}))
+    assert tsttc("board").output.startswith("test · edition 2 · updated 2026-11-28\n")

