@@ -172,7 +172,7 @@ def test_certificates_that_cannot_be_read_are_named(
     )
 
 
-def test_server_without_tls_is_said_to_have_none(tsttc: Tsttc, site: RecordedSite) -> None:
+def test_server_without_tls_is_named_as_one(tsttc: Tsttc, site: RecordedSite) -> None:
     result = tsttc("board", "val", "--server", site.url.replace("http:", "https:"))
     assert result.exit_code == 3
     assert " answers, but not over TLS (" in result.stderr

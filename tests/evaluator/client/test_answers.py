@@ -1,4 +1,4 @@
-"""The answers that the client reads, beside what the API's schema declares."""
+"""The answers that the client reads, compared with what the API's schema declares."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_every_field_that_the_client_needs_is_one_that_the_api_always_has(name: 
         assert set(needed) <= set(SCHEMAS[name]["required"])
 
 
-def test_every_kind_of_answer_is_held_against_the_schema() -> None:
+def test_every_kind_of_answer_is_compared_with_the_schema() -> None:
     structs = {
         each
         for each in vars(answers).values()
