@@ -8,7 +8,8 @@ from typing import Any, Final
 import pandas as pd
 
 from evaluator.arguments import require
-from evaluator.predictions.loading import NATURAL_KEY, PREDICTED, RATES, Predictions, read_predictions
+from evaluator.predictions.headers import NATURAL_KEY, PREDICTED, RATES
+from evaluator.predictions.loading import Predictions, read_predictions
 from evaluator.truth.csv_tables import require_one_column
 from evaluator.truth.ground_truth import Manifest
 

@@ -11,6 +11,8 @@ from typing import Final, Literal
 
 import numpy as np
 
+from evaluator.predictions import headers
+from evaluator.predictions.recognition import is_printed_dict
 from evaluator.problems import Findings, pointer, quoted, reject
 
 Unit = Literal["ttc", "scale_ratio"]
@@ -24,19 +26,6 @@ FIELDS: Final = ("unit", "fps", "frame_gap", "meta", "predictions")
 _STRING: Final = re.compile(rb'"(?:[^"\\]|\\.)*+(?:"|\\?\Z)', re.DOTALL)
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 EMPTY_MESSAGE: Final = "The file is empty; expected JSON text with a number for every sequence."
-# What people send by mistake, by its first bytes.
-_LOOKS_LIKE: Final = {
-    b"\xff\xfe": "UTF-16",
-    b"\xfe\xff": "UTF-16",
-    b"\x89PNG": "a PNG image",
-    b"\xff\xd8\xff": "a JPEG image",
-    b"%PDF": "a PDF document",
-    b"PK\x03\x04": "a ZIP archive or a NumPy .npz file; send the JSON file itself",
-    b"\x93NUMPY": "a NumPy .npy file",
-    b"\x89HDF": "an HDF5 file",
-    b"PAR1": "a Parquet table; tsttc submit sends one, and tsttc convert makes JSON of it",
-    b"\x80": "a Python pickle",
-}
 
 
 class Members(list[tuple[str, object]]):
@@ -66,14 +55,15 @@ def parse(data: bytes, *, max_members: int | None = None) -> object:
         text = body.decode("utf-8")
     except UnicodeDecodeError as error:
         start = error.start + len(data) - len(body)
-        message = (
-            f"Byte {start:,} of the file is not UTF-8; expected JSON text encoded in UTF-8.{_hint(data)}"
-        )
+        message = f"Byte {start:,} of the file is not UTF-8; expected JSON text encoded in UTF-8."
         raise reject("not-utf8", message, f"byte {start}") from None
     if not body.strip(b" \t\r\n"):
         raise reject("not-json", EMPTY_MESSAGE)
+    other = headers.refusal_of_text(headers.first_line(body))
     n_members = body.count(b",") + 1
     if max_members is not None and n_members > max_members:
+        if other is not None:
+            raise other
         message = f"The file has up to {n_members:,} members and items; expected at most {max_members:,}."
         raise reject("too-many-members", message)
     n_marks = body.count(b'"')
@@ -91,16 +81,21 @@ def parse(data: bytes, *, max_members: int | None = None) -> object:
     try:
         return json.loads(text, object_pairs_hook=Members, parse_int=_integer)
     except json.JSONDecodeError as error:
+        if other is not None:
+            raise other from None
         where = f"line {error.lineno}, column {error.colno}"
         excerpt = quoted(text[error.pos : error.pos + 20]) if error.pos < len(text) else "the end of the file"
         fault = error.msg[0].lower() + error.msg[1:].removesuffix(" at").removesuffix(" starting")
-        message = f"The text is not JSON: {fault}, found {excerpt}.{_hint(data)}"
+        message = f"The text is not JSON: {fault}, found {excerpt}.{_hint(text, error)}"
         raise reject("not-json", message, where) from None
 
 
-def _hint(data: bytes) -> str:
-    kind = next((kind for start, kind in _LOOKS_LIKE.items() if data.startswith(start)), "")
-    return f" The file looks like {kind}." if kind else ""
+def _hint(text: str, error: json.JSONDecodeError) -> str:
+    if is_printed_dict(text):
+        return " The file looks like a dict as Python prints it; json.dump writes JSON."
+    if error.msg == "Extra data" and text[error.pos] == "{":
+        return " The file has several objects, as JSON Lines; expected one object."
+    return ""
 
 
 def read_document(value: object) -> Document:

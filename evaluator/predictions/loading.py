@@ -21,13 +21,13 @@ from evaluator.arguments import Source, data_of, require
 from evaluator.arrays import as_floats, in_row_order
 from evaluator.counting import counted, file_size
 from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
+from evaluator.predictions import headers, recognition
 from evaluator.predictions.alignment import read_slowly
 from evaluator.predictions.columns import read_column
 from evaluator.predictions.documents import Unit
 from evaluator.predictions.parquet import as_sent
 from evaluator.predictions.writing import rate_of, require_values
-from evaluator.problems import pointer, quoted, reject
-from evaluator.truth.csv_tables import require_one_column
+from evaluator.problems import pointer, reject
 from evaluator.truth.ground_truth import KeyKind, Manifest
 
 
@@ -174,33 +174,22 @@ _PADDING: Final = re.compile(rb"\x00*")
 MAX_COLUMNS: Final = 1_000
 """What a line of a CSV table may have, far more than the columns that are read."""
 
-NATURAL_KEY: Final = ("bag_stamp", "cam_id", "ts", "track_id")
-VALUES: Final = {"ttc": "ttc", "ttc_s": "ttc", "scale_ratio": "scale_ratio"}
-RATES: Final = ("fps", "frame_gap")
-PREDICTED: Final = "predicted_ttc_s"
-"""In the table of `tsttc score --per-sequence`, beside the true times."""
-
-_NAMES: Final = frozenset({"anno_id", *NATURAL_KEY, *VALUES, *RATES})
-_OTHER_SEPARATORS: Final = {";": "semicolons", "\t": "tabs"}
-_FIRST_LINE: Final = re.compile(rb"\s*([^\r\n]{0,2000})")
 _NUMBER: Final = re.compile(
     r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?(?:nan|inf|infinity)", re.IGNORECASE
-)
-_EXPECTED: Final = (
-    "expected anno_id, or bag_stamp, cam_id, ts and track_id, and either ttc (seconds) or scale_ratio with "
-    "fps or frame_gap"
 )
 
 
 def json_of(data: bytes, *, max_rows: int | None = None) -> bytes:
     """Return the JSON text of a prediction file; raises `Rejected` for a damaged or too large one."""
-    if data.startswith(GZIP):
+    is_unpacked = data.startswith(GZIP)
+    if is_unpacked:
         data = _unpacked(data)
-    for separator, name in _OTHER_SEPARATORS.items():
-        if _is_table(data, separator=separator):
-            message = f"The fields of the table are separated by {name}; expected commas."
-            raise reject("bad-csv", message, "line 1")
-    return _of_table(data, max_rows=max_rows) if _is_table(data) else data
+    line = headers.first_line(data)
+    headers.require_commas(line)
+    if headers.is_header(line):
+        return _of_table(data, max_rows=max_rows)
+    recognition.require_no_other_kind(data, is_unpacked=is_unpacked)
+    return data
 
 
 def _unpacked(data: bytes) -> bytes:
@@ -243,18 +232,6 @@ def _member(data: bytes, start: int, *, max_bytes: int) -> tuple[bytes, int]:
     return b"".join(parts), start
 
 
-def _is_table(data: bytes, *, separator: str = ",") -> bool:
-    # No JSON text begins with the columns of a table.
-    match = _FIRST_LINE.match(data.removeprefix(b"\xef\xbb\xbf"))
-    line = match[1] if match else b""
-    fields = line.decode("utf-8", "replace").split(separator)
-    return (
-        len(fields) > 1
-        and not line.startswith((b"{", b"["))
-        and not _NAMES.isdisjoint(name.strip().strip('"') for name in fields)
-    )
-
-
 def _of_table(data: bytes, *, max_rows: int | None) -> bytes:
     try:
         text = data.decode("utf-8-sig")
@@ -291,29 +268,10 @@ def _checked(rows: Iterator[list[str]], *, n_fields: int) -> Iterator[list[str]]
         yield row
 
 
-def columns_of(header: Sequence[str]) -> tuple[Sequence[str], str, str | None]:
-    """Return key columns, value column and rate column of a table; raises `Rejected` if one is missing."""
-    keys = NATURAL_KEY if set(NATURAL_KEY) <= set(header) else ("anno_id",)
-    values = [name for name in VALUES if name in header]
-    rates = [name for name in RATES if name in header]
-    if not set(keys) <= set(header) or len(values) != 1 or len(rates) != (values == ["scale_ratio"]):
-        message = f"The table has the columns {quoted(','.join(header))}; {_EXPECTED}."
-        raise reject("missing-columns", message, "line 1")
-    require_one_column(header, (*keys, *values, *rates), where="line 1")
-    if PREDICTED in header:
-        message = (
-            f"The table has the columns {quoted(values[0])} and {quoted(PREDICTED)}, as tsttc score "
-            "--per-sequence writes them: the true times and the predictions. Expected predictions alone: "
-            f"remove {quoted(values[0])} and rename {quoted(PREDICTED)} to ttc."
-        )
-        raise reject("bad-field", message, "line 1")
-    return keys, values[0], rates[0] if rates else None
-
-
 def document_of(header: Sequence[str], rows: Iterable[Sequence[str | None]]) -> bytes:
     """Write the JSON text of a table: flat for seconds, an envelope for scale ratios; raises `Rejected`."""
     # Duplicate keys stay. A field of None has no value.
-    keys, value, rate = columns_of(header)
+    keys, value, rate = headers.columns_of(header)
     columns = {name: header.index(name) for name in (*keys, value, *([rate] if rate else []))}
     key_positions = [columns[name] for name in keys]
     members, ratios = list[str](), list[str]()

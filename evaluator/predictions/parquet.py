@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from typing import Any, Final
 
+from evaluator.predictions.headers import columns_of
 from evaluator.problems import quoted, reject
 
 _MAGIC: Final = b"PAR1"
@@ -38,8 +39,6 @@ def as_sent(data: bytes) -> bytes:
 
 
 def _columns(schema: Any) -> tuple[list[str], list[str]]:
-    from evaluator.predictions.loading import columns_of  # noqa: PLC0415 -- which asks this module
-
     keys, value, rate = columns_of(schema.names)
     values = [value] if rate is None else [value, rate]
     for name in (*keys, *values):

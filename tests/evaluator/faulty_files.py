@@ -54,23 +54,20 @@ CASES: dict[str, tuple[Any, ...]] = {
     "a PNG image": (
         b"\x89PNG\r\n\x1a\n",
         "not-utf8",
-        "Byte 0 of the file is not UTF-8; expected JSON text encoded in UTF-8. "
-        "The file looks like a PNG image.",
-        "byte 0",
+        "The file is a PNG image; expected JSON text or a CSV table, in UTF-8. "
+        "Send the file with the predictions.",
     ),
     "a Parquet table": (
         b"PAR1",
         "not-json",
-        'The text is not JSON: expecting value, found "PAR1". '
-        "The file looks like a Parquet table; tsttc submit sends one, and tsttc convert makes JSON of it.",
-        "line 1, column 1",
+        "The file is a Parquet table; expected JSON text or a CSV table, in UTF-8. "
+        "tsttc submit sends one, and tsttc convert makes JSON of it.",
     ),
     "a ZIP archive": (
         b"PK\x03\x04",
         "not-json",
-        'The text is not JSON: expecting value, found "PK\\u0003\\u0004". '
-        "The file looks like a ZIP archive or a NumPy .npz file; send the JSON file itself.",
-        "line 1, column 1",
+        "The file is a ZIP archive; expected JSON text or a CSV table, in UTF-8. "
+        "Unpack it and send the JSON or CSV file in it, or compress that file with gzip.",
     ),
     "more after the end": (
         flat(GOOD) + b"}",
@@ -99,8 +96,8 @@ CASES: dict[str, tuple[Any, ...]] = {
     "UTF-16": (
         json.dumps(GOOD).encode("utf-16"),
         "not-utf8",
-        "Byte 0 of the file is not UTF-8; expected JSON text encoded in UTF-8. The file looks like UTF-16.",
-        "byte 0",
+        "The file is text in UTF-16; expected JSON text or a CSV table, in UTF-8. "
+        "Save it as UTF-8; in PowerShell, Out-File -Encoding utf8 does this.",
     ),
     "an encoded surrogate": (
         b'{"\xed\xa0\x80": 1}',

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from evaluator import Problem, Rejected, convert, read_predictions, scale_ratio_to_ttc
-from evaluator.predictions import loading
+from evaluator.predictions import headers, loading
 from evaluator.predictions.loading import sha256_digest
 from tests.evaluator.worlds import flat, make_truth
 
@@ -19,7 +19,7 @@ GOOD = flat([1.5, -2.25, 30.0])
 
 def table(*columns: str, end: str = "\n", rows: dict[str, list[str]] | None = None) -> bytes:
     names = {"ts": "ts_ns"}
-    keys = {name: getattr(MANIFEST, names.get(name, name)) for name in (*loading.NATURAL_KEY, "anno_id")}
+    keys = {name: getattr(MANIFEST, names.get(name, name)) for name in (*headers.NATURAL_KEY, "anno_id")}
     values = {"ttc": ["1.5", "-2.25", "3e1"], "scale_ratio": ["0.9", "1.1", "1"], "frame_gap": [5, 5, 1]}
     cells: dict[str, Any] = keys | values | {"note": ["a", '"b,c"', ""]} | (rows or {})
     lines = [",".join(columns), *(",".join(str(cells[name][row]) for name in columns) for row in range(3))]
@@ -27,7 +27,7 @@ def table(*columns: str, end: str = "\n", rows: dict[str, list[str]] | None = No
 
 
 @pytest.mark.parametrize(
-    "columns", [("anno_id", "ttc"), (*loading.NATURAL_KEY, "ttc"), ("note", "ttc", "anno_id")]
+    "columns", [("anno_id", "ttc"), (*headers.NATURAL_KEY, "ttc"), ("note", "ttc", "anno_id")]
 )
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 @pytest.mark.parametrize("start", [b"", b"\xef\xbb\xbf"])

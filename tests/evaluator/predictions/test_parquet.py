@@ -109,8 +109,10 @@ def test_two_columns_of_one_name_are_refused() -> None:
 def test_the_server_reads_no_parquet_and_says_what_to_do() -> None:
     text = answer(GOOD, manifest=MANIFEST).decode()
     assert '"verdict": "rejected"' in text
-    assert "The file looks like a Parquet table; tsttc submit sends one, and tsttc convert makes JSON" in text
-    assert json_of(GOOD) == GOOD
+    assert "The file is a Parquet table; expected " in text
+    assert "tsttc submit sends one, and tsttc convert makes JSON of it." in text
+    with pytest.raises(Rejected):
+        json_of(GOOD)
 
 
 def test_a_machine_without_pyarrow_says_what_to_install(
