@@ -7,6 +7,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -124,6 +125,8 @@ def _start(make: Callable[[], Worker[Any]], theirs: Connection) -> None:
     threading.Thread(target=_end_with, args=(theirs,), daemon=True).start()
     cv2.setNumThreads(1)
     _workers[:] = [make()]
+    if torch := sys.modules.get("torch"):  # of the method: as many threads as processors, in each process
+        torch.set_num_threads(1)
 
 
 def _end_with(theirs: Connection) -> None:

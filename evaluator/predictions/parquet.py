@@ -30,8 +30,10 @@ def as_sent(data: bytes) -> bytes:
     from evaluator.predictions.loading import document_of  # noqa: PLC0415 -- which asks this module
 
     try:
-        table = parquet.ParquetFile(io.BytesIO(data))
-        keys, values = _columns(table.schema_arrow)
+        # In this thread alone: one of Arrow's own for reading ahead can abort the process when it ends.
+        with parquet.ParquetFile(io.BytesIO(data), pre_buffer=False) as file:
+            keys, values = _columns(file.schema_arrow)
+            table = file.read(columns=keys + values, use_threads=False)
         return document_of(keys + values, _rows(table, keys, values))
     except (pa.ArrowException, OSError, ValueError, OverflowError, KeyError) as error:
         reason = (str(error).splitlines() or ["it ends early"])[0].removesuffix(".")
@@ -69,7 +71,7 @@ def _is_fitting(column_type: Any, *, is_key: bool) -> bool:
 
 def _rows(table: Any, keys: list[str], values: list[str]) -> Iterator[Sequence[str | None]]:
     number = 0
-    for batch in table.iter_batches(columns=keys + values, use_threads=False):
+    for batch in table.to_batches():
         columns = [map(_text, batch.column(name).to_pylist()) for name in keys + values]
         for row in zip(*columns, strict=True):
             number += 1

@@ -147,5 +147,7 @@ def operations_on(device: Device, weights: Weights) -> Operations:
         raise ValueError(
             "--device cuda needs a graphics card that torch can use; expected cpu or numpy here."
         )
+    if device == "cpu":
+        torch.set_num_threads(1)  # sequences are spread over processes, and the layers are small
     tensors = {name: torch.from_numpy(values).to(device) for name, values in weights.tensors.items()}
     return TorchLayers(tensors)

@@ -1,6 +1,8 @@
 """Parquet tables: read on one's own machine as the JSON that the leaderboard takes, and by no server."""
 
 import io
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -131,3 +133,20 @@ def test_tables_of_results_keep_numbers_texts_and_what_is_missing() -> None:
     rows: list[dict[str, object]] = [{"a": 1.5, "b": "x"}, {"a": None, "b": "=y"}]
     written = pq.read_table(io.BytesIO(parquet_of(rows, columns=["a", "b"])))
     assert written.to_pylist() == rows
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="the system does not list threads")
+def test_reading_a_table_starts_no_thread_that_could_abort_the_end_of_the_process(tmp_path: Path) -> None:
+    path = tmp_path / "x.parquet"
+    path.write_bytes(GOOD)
+    program = f"""
+import os
+from pathlib import Path
+from pyarrow import parquet
+from evaluator.predictions.parquet import as_sent
+before = len(os.listdir("/proc/self/task"))
+as_sent(Path({str(path)!r}).read_bytes())
+print(len(os.listdir("/proc/self/task")) - before)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "0\n"
