@@ -1,6 +1,6 @@
 """Score receipts: JSON Web Tokens (RFC 7519) signed by EdDSA, checked offline.
 
-    verified = verify(receipt_bytes, read_keys(keys_bytes))    # raises NotVerified
+    verified = verify(receipt, read_keys(keys))    # contents of files, raises NotVerified
     verified.scores["mid"], verified.edition, verified.site
 
 Scores are decimal texts with the edition's decimals (`"15.03"`). The keys are a JSON Web Key Set (RFC 7517,
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from evaluator.metrics.protocol import PROTOCOLS
+from evaluator.texts import text_of
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
@@ -86,16 +87,25 @@ def key_set(public_keys: list[bytes]) -> Document:
     return {"keys": [shared | {"kid": key_id(key), "x": encode(key)} for key in public_keys]}
 
 
-def read_keys(data: bytes) -> dict[str, Ed25519PublicKey]:
+def read_keys(data: bytes | str) -> dict[str, Ed25519PublicKey]:
     """Read the Ed25519 keys of a key set, by name. Raises `NotVerified` (`receipt-keys`)."""
+    data = _content(data, name="data")
     from jwt import PyJWKSet, PyJWTError  # noqa: PLC0415 - slow to import
 
     try:
         # Keys of other kinds are somebody else's business, as RFC 7517 says.
-        rows = [key for key in PyJWKSet.from_json(data.decode()) if key.algorithm_name == "EdDSA"]
+        rows = [key for key in PyJWKSet.from_json(text_of(data)) if key.algorithm_name == "EdDSA"]
         return {cast("str", row.key_id): row.key for row in rows} or _no_keys()
     except (PyJWTError, ValueError, TypeError, AttributeError, RecursionError):
         return _no_keys()
+
+
+def _content(given: bytes | str, *, name: str) -> bytes:
+    if isinstance(given, str):
+        return given.encode()
+    if not isinstance(given, bytes):
+        raise TypeError(f"{name} is of type {type(given).__name__}; expected the content of a file.")
+    return given
 
 
 def _no_keys() -> dict[str, Ed25519PublicKey]:
@@ -131,8 +141,21 @@ def sign(document: Mapping[str, Any], *, private_key: bytes) -> str:
     return jwt.encode({"version": VERSION, **document}, key, algorithm="EdDSA", headers=headers)
 
 
-def verify(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
+def claimed_site(receipt: bytes | str) -> str:
+    """Return the site that a receipt names, unchecked, or an empty text: whoever wrote it can name any."""
+    import jwt  # noqa: PLC0415 - slow to import
+
+    try:
+        text = text_of(_content(receipt, name="receipt")).strip()
+        site = jwt.decode(text, options={"verify_signature": False}).get("site")
+    except (jwt.PyJWTError, ValueError, RecursionError):
+        return ""
+    return site if isinstance(site, str) else ""
+
+
+def verify(receipt: bytes | str, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
     """Check a receipt's signature by these keys (see `read_keys`) and read it. Raises `NotVerified`."""
+    receipt = _content(receipt, name="receipt")
     if len(receipt) > MAX_BYTES:
         raise _malformed(f"it has {len(receipt):,} bytes; expected at most {MAX_BYTES:,}")
     try:
@@ -151,7 +174,7 @@ def verify(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
 def _read(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> tuple[str, Document]:
     import jwt  # noqa: PLC0415 - slow to import
 
-    text = receipt.decode().strip()
+    text = text_of(receipt).strip()
     try:
         header = jwt.get_unverified_header(text)
         if header.get("typ") != TYPE:

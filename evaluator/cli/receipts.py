@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 import click
+from click.core import ParameterSource
 
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json, rejected
 from evaluator.cli.layout import printable, score_table, units
-from evaluator.cli.options import json_option, output_option, site_options, slug
+from evaluator.cli.options import DEFAULT_URL, json_option, output_option, site_options, slug
+from evaluator.cli.paths import server_of_login
 from evaluator.cli.reading import bytes_of, write_bytes
 from evaluator.problems import Rejected
 
@@ -76,20 +79,31 @@ def verify(*, receipt_path: Path, keys_path: Path | None, url: str, as_json: boo
     if receipt_path.is_dir():
         _verify_archive(receipt_path, keys=bytes_of(keys_path) if keys_path else None, as_json=as_json)
         return
-    from evaluator.receipts import NotVerified, read_keys  # noqa: PLC0415 -- needed here alone
+    from evaluator.receipts import NotVerified, claimed_site, read_keys  # noqa: PLC0415 -- needed here alone
     from evaluator.receipts import verify as verified_by  # noqa: PLC0415 -- as above
 
     data = bytes_of(receipt_path)
     if keys_path is not None:
         keys_data = bytes_of(keys_path)
     else:
+        site = claimed_site(data)
+        if _is_nobody_s(url) and site and _host(site) != _host(url):
+            raise Failure(
+                f"No site is named whose keys check this receipt. The receipt names {site}.",
+                exit_code=Exit.USAGE,
+                code="no-server",
+                hint=_with_keys_of(site, receipt_path),
+            )
         with connect(url, with_token=False) as client:
             keys_data = client.receipt_keys()
     try:
         receipt = verified_by(data, read_keys(keys_data))
     except NotVerified as fault:
-        raise Failure(str(fault), exit_code=Exit.REJECTED, code=fault.code) from None
-    is_elsewhere = keys_path is None and urlsplit(receipt.site).netloc != urlsplit(url).netloc
+        site = claimed_site(data)
+        is_of_another = fault.code == "receipt-key-unknown" and site and _host(site) != _host(url)
+        hint = _with_keys_of(site, receipt_path) if is_of_another and keys_path is None else ""
+        raise Failure(str(fault), exit_code=Exit.REJECTED, code=fault.code, hint=hint) from None
+    is_elsewhere = keys_path is None and _host(receipt.site) != _host(url)
     if as_json:
         echo_json({name: getattr(receipt, name) for name in receipt.__dataclass_fields__})
     else:
@@ -99,6 +113,24 @@ def verify(*, receipt_path: Path, keys_path: Path | None, url: str, as_json: boo
         click.echo(
             f"Note: the receipt names {printable(receipt.site)}; the keys are those of {url}.", err=True
         )
+
+
+def _is_nobody_s(url: str) -> bool:
+    """Whether nobody named the server: no option, no environment, no login."""
+    source = click.get_current_context().get_parameter_source("url")
+    return source is ParameterSource.DEFAULT and server_of_login() is None and url == DEFAULT_URL
+
+
+def _host(url: str) -> str:
+    try:
+        return urlsplit(url).netloc.lower()
+    except ValueError:  # brackets that are none
+        return ""
+
+
+def _with_keys_of(site: str, path: Path) -> str:
+    words = map(shlex.quote, (str(path), "--server", printable(site)))
+    return f"If you trust that site: tsttc verify {' '.join(words)}"
 
 
 def _verify_archive(folder: Path, *, keys: bytes | None, as_json: bool) -> None:

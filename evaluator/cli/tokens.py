@@ -15,6 +15,7 @@ from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
 from evaluator.cli.options import TOKEN_VARIABLE
 from evaluator.cli.paths import settings_file
+from evaluator.texts import text_of
 
 if TYPE_CHECKING:
     from keyring.backend import KeyringBackend
@@ -160,7 +161,7 @@ def _keep_in_file(kept: dict[str, str]) -> str:
 
 def _text_of(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return text_of(path.read_bytes())
     except (OSError, UnicodeDecodeError) as error:
         cause = getattr(error, "strerror", None) or "it is not text"
         raise Failure(

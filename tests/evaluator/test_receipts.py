@@ -70,6 +70,23 @@ def test_receipt_verifies_and_says_the_numbers() -> None:
     assert receipts.verify(b"\n" + RECEIPT + b"\n", KEYS) == verified
 
 
+def test_text_is_read_like_bytes_and_anything_else_is_a_type_error() -> None:
+    keys = json.dumps(receipts.key_set([receipts.public_key(SEED)]))
+    assert receipts.verify(RECEIPT.decode(), receipts.read_keys(keys)) == receipts.verify(RECEIPT, KEYS)
+    others: list[Any] = [None, 5, ["a"]]
+    for other in others:
+        with pytest.raises(TypeError, match="expected the content of a file"):
+            receipts.verify(other, KEYS)
+        with pytest.raises(TypeError, match="expected the content of a file"):
+            receipts.read_keys(other)
+
+
+def test_site_of_a_receipt_can_be_read_before_it_is_checked() -> None:
+    assert receipts.claimed_site(RECEIPT) == "https://example.org"
+    for text in (b"", b"x", b"a.b.c", b"\xff\xfe\x00", token({"site": 5})):
+        assert receipts.claimed_site(text) == ""
+
+
 def test_signing_again_gives_the_same_bytes() -> None:
     assert receipts.sign(fields(), private_key=SEED).encode() == RECEIPT
     # Fixed for ever: what was signed years ago is checked by tomorrow's code.

@@ -10,6 +10,7 @@ import pytest
 
 from evaluator import compare_predictions, read_predictions, read_truth
 from evaluator.metrics.protocol import SCORE_NAMES
+from evaluator.receipts import key_set, public_key
 from evaluator.tables.sentences import influence, sentence
 from tests.evaluator.cli.console import METHOD_ID, RECEIPT, RECEIPT_KEYS
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
@@ -239,6 +240,32 @@ def test_verify_asks_the_named_server_for_its_keys_and_no_other(
         f"Note: the receipt names https://leaderboard.example.org; the keys are those of {site.url}.\n"
     )
     assert site.requests[0].headers["Authorization"] is None
+
+
+def test_verify_of_a_reviewer_without_a_login_names_the_site_of_the_receipt(
+    tsttc: Tsttc, site: RecordedSite, receipt: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("TSTTC_URL")
+    result = tsttc("verify", receipt)
+    assert result.exit_code == 2
+    assert "The receipt names https://leaderboard.example.org." in result.stderr
+    command = f"tsttc verify {receipt} --server https://leaderboard.example.org"
+    assert command in result.stderr
+    site.put(KEYS, Reply(key_set([public_key(bytes(32))])))
+    other = tsttc("verify", receipt, "--server", site.url)
+    assert (other.exit_code, command in other.stderr) == (1, True), "the keys of another site"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-be"])
+def test_receipts_and_keys_of_any_editor_are_read(
+    tsttc: Tsttc, receipt: Path, tmp_path: Path, encoding: str
+) -> None:
+    mark = "\ufeff" if encoding == "utf-16-be" else ""
+    keys = tmp_path / "keys.json"
+    keys.write_bytes((mark + json.dumps(RECEIPT_KEYS)).encode(encoding))
+    receipt.write_bytes((mark + RECEIPT).encode(encoding))
+    result = tsttc("verify", receipt, "--keys", keys)
+    assert result.exit_code == 0, result.stderr
 
 
 def test_verify_with_kept_keys_asks_nobody(

@@ -28,11 +28,12 @@ def test_files_saved_by_windows_editors_mean_the_same(tsttc: Tsttc, tmp_path: Pa
     assert shown.exit_code == 0, shown.stderr
 
 
+@pytest.mark.parametrize("content", [MARK + b"tsttc_abc\r\n", "tsttc_abc\r\n".encode("utf-16")])
 def test_a_token_file_may_begin_with_a_mark_and_end_with_any_line_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes
 ) -> None:
     path = tmp_path / "token.txt"
-    path.write_bytes(MARK + b"tsttc_abc\r\n")
+    path.write_bytes(content)
     monkeypatch.delenv("TSTTC_TOKEN", raising=False)
     monkeypatch.setenv("TSTTC_TOKEN_FILE", str(path))
     assert tokens.token_for("https://example.org") == "tsttc_abc"
