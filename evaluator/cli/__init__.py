@@ -6,6 +6,8 @@ import errno
 import io
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, Final
 
@@ -49,6 +51,21 @@ COMMANDS: Final = {
 DISK_FAULTS: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO})
 
 
+@contextmanager
+def _quiet_without_a_reader() -> Iterator[None]:
+    """End as other programs do where `head` has read enough: silently, and not as the file's fault."""
+    try:
+        yield
+    except BrokenPipeError:
+        _discard_the_rest()
+        sys.exit(Exit.CLOSED)
+
+
+def _discard_the_rest() -> None:
+    # What is still buffered would fail once more when Python ends.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno() if sys.__stdout__ else 1)
+
+
 class _Group(click.Group):
     """The group `tsttc`: words failures, handles Ctrl-C, replaces characters that a terminal lacks."""
 
@@ -58,12 +75,19 @@ class _Group(click.Group):
         except OSError as error:
             if error.errno not in DISK_FAULTS or error.filename is not None:
                 raise
-            # What is still buffered would fail once more when Python ends.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno() if sys.__stdout__ else 1)
+            _discard_the_rest()
             click.echo(f"Error: Standard output cannot be written: {error.strerror}.", err=True)
             sys.exit(Exit.USAGE)
 
+    def make_context(self, *args: Any, **extra: Any) -> click.Context:
+        with _quiet_without_a_reader():
+            return super().make_context(*args, **extra)
+
     def invoke(self, ctx: click.Context) -> object:
+        with _quiet_without_a_reader():
+            return self._invoke(ctx)
+
+    def _invoke(self, ctx: click.Context) -> object:
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="replace")

@@ -19,6 +19,7 @@ class Exit(IntEnum):
     TIMEOUT = 9
     UNCONFIRMED = 10
     INTERRUPTED = 130
+    CLOSED = 141
 
 
 MEANINGS: Final[dict[Exit, str]] = {
@@ -34,5 +35,6 @@ MEANINGS: Final[dict[Exit, str]] = {
     Exit.TIMEOUT: "not finished within --timeout; the evaluation continues",
     Exit.UNCONFIRMED: "not confirmed (--yes): the file has a warning, or a new method a name like another",
     Exit.INTERRUPTED: "interrupted with Ctrl-C",
+    Exit.CLOSED: "the program that reads the output ended early, as head does",
 }
 """Every code in words, as docs/cli.md has them."""

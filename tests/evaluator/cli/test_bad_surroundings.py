@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import subprocess
 import sys
@@ -26,6 +27,25 @@ def test_full_disk_is_one_line_and_not_the_file_s_fault(arguments: tuple[object,
         result = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     words = "Error: Standard output cannot be written: No space left on device.\n"
     assert (result.returncode, result.stderr) == (2, words)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--help",),
+        ("score", "--help"),
+        ("score", EXAMPLES / "predictions.json", "--truth", EXAMPLES / "truth.csv"),
+        ("manifest", EXAMPLES / "truth.csv"),
+    ],
+)
+def test_output_that_nobody_reads_any_more_ends_the_command_quietly(arguments: tuple[object, ...]) -> None:
+    command = [sys.executable, "-m", "evaluator", *map(str, arguments)]
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "wb") as pipe:
+        result = subprocess.run(command, stdout=pipe, stderr=subprocess.PIPE, text=True, check=False)
+    assert (result.returncode, result.stderr) == (141, "")
 
 
 def test_proxy_that_refuses_is_named_without_its_password(
