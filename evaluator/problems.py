@@ -83,7 +83,12 @@ class Problem:
     where: str = ""
 
     def __str__(self) -> str:
-        return f"{self.where}: {self.message}" if self.where else self.message
+        return f"{self.plain_where}: {self.message}" if self.where else self.message
+
+    @property
+    def plain_where(self) -> str:
+        """`where` for people: of a JSON pointer, the name of the member."""
+        return plain_pointer(self.where)
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +187,9 @@ class _Line:
             return self.problem
         # One name more than are shown says that there are more.
         further = "1 more place has" if self.n_more == 1 else f"{self.n_more:,} more places have"
-        message = f"{self.problem.message} {further} this problem: {listed(self.more)}."
+        message = (
+            f"{self.problem.message} {further} this problem: {listed([*map(plain_pointer, self.more)])}."
+        )
         return Problem(self.problem.code, message, self.problem.where)
 
 
@@ -255,6 +262,20 @@ def pointer(*parts: str) -> str:
     """
     escaped = (part[:200].replace("~", "~0").replace("/", "~1") for part in parts)
     return "".join("/" + json.dumps(part)[1:-1] for part in escaped)
+
+
+def plain_pointer(where: str) -> str:
+    """Return a JSON pointer as people read it, other places as they are.
+
+    >>> plain_pointer("/predictions/0007~11~1500~13"), plain_pointer("/fps/12"), plain_pointer("line 3")
+    ('"0007/1/500/3"', '"12" in "fps"', 'line 3')
+    """
+    if not where.startswith("/"):
+        return where
+    parts = [part.replace("~1", "/").replace("~0", "~") for part in where[1:].split("/")]
+    if len(parts) > 1 and parts[0] == "predictions":
+        parts = parts[1:]
+    return " in ".join(f'"{part}"' for part in reversed(parts))
 
 
 def listed(names: Sequence[str]) -> str:

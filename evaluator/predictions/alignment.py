@@ -11,8 +11,9 @@ from typing import TypeGuard
 import numpy as np
 
 from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap, scale_ratio_to_ttc
+from evaluator.predictions import misspelt
 from evaluator.predictions.documents import Document, Members, Unit, kind_of, parse, read_document
-from evaluator.predictions.values import RULES, allowed, broken_rule
+from evaluator.predictions.values import RULES, WITHOUT_ESTIMATE, allowed, broken_rule
 from evaluator.problems import Findings, listed, pointer, quoted, reject
 from evaluator.truth.ground_truth import KeyKind, Manifest
 
@@ -97,15 +98,17 @@ def _check_keys(members: Members, manifest: Manifest, findings: Findings, pointe
     names = [name for name, _ in members]
     id_names = [name for name in names if name in by_id]
     natural_names = [name for name in names if name in by_natural_key]
-    kind: KeyKind = "natural_key" if len(natural_names) > len(id_names) else "anno_id"
-    noun = "natural key" if kind == "natural_key" else "anno_id"
     unknown = [name for name in names if name not in by_id and name not in by_natural_key]
+    kind = _kind_of(id_names, natural_names, unknown)
+    noun = "natural key" if kind == "natural_key" else "anno_id"
     if unknown:
         message = (
             f"{_n(len(unknown), 'key is', 'keys are')} not in the manifest: "
             f"{listed([quoted(name) for name in unknown])}; expected the manifest's anno_ids, as plain "
             "decimal numbers, or its natural keys, bag_stamp/cam_id/ts/track_id."
         )
+        if hint := misspelt.advice(unknown, manifest):
+            message = f"{message} {hint}"
         findings.group("unknown-keys", message, pointer_of(unknown[0]), n_faults=len(unknown))
     require_once(names, findings, pointer_of)
     if id_names and natural_names:
@@ -118,13 +121,37 @@ def _check_keys(members: Members, manifest: Manifest, findings: Findings, pointe
     given = {by_id[name] for name in id_names} | {by_natural_key[name] for name in natural_names}
     n_missing = manifest.n_sequences - len(given)
     if n_missing:
-        missing = [name for row, name in enumerate(manifest.keys_of(kind)) if row not in given]
+        rows = [row for row in range(manifest.n_sequences) if row not in given]
+        missing = [manifest.keys_of(kind)[row] for row in rows]
         message = (
-            f"{_n(n_missing, 'sequence has', 'sequences have')} no value: {listed(missing)}; "
+            f"{_n(n_missing, 'sequence has', 'sequences have')} no value: "
+            f"{_listed_rows(rows, manifest, kind=kind)}; "
             f"expected one for each of the manifest's {manifest.n_sequences:,} sequences, by {noun}."
         )
         findings.group("missing-keys", message, pointer_of(missing[0]), n_faults=n_missing)
     return kind
+
+
+def _kind_of(id_names: list[str], natural_names: list[str], unknown: list[str]) -> KeyKind:
+    """Return the kind of the most keys: by the manifest, or by their form if it has none of them."""
+    if not id_names and not natural_names:
+        examined = unknown[: misspelt.MAX_EXAMINED]
+        n_natural = sum(map(misspelt.is_natural, examined))
+        return "natural_key" if 2 * n_natural > len(examined) else "anno_id"
+    return "natural_key" if len(natural_names) > len(id_names) else "anno_id"
+
+
+def _listed_rows(rows: list[int], manifest: Manifest, *, kind: KeyKind) -> str:
+    """List sequences by key, and a whole recording as one item."""
+    keys, recordings = manifest.keys_of(kind), manifest.bag_stamp
+    n_given = Counter(recordings[row] for row in rows)
+    n_all = Counter(recordings)
+    whole = [name for name, n in n_given.items() if n == n_all[name] and n > 1]
+    if len(rows) == manifest.n_sequences:
+        whole = []  # the keys themselves show how the file should name the sequences
+    items = [f"all {n_all[name]} sequences of {name}" for name in whole]
+    rest = set(n_given) - set(whole)
+    return listed([*items, *(keys[row] for row in rows if recordings[row] in rest)])
 
 
 def _column(
@@ -159,7 +186,8 @@ def fault_of(unit: Unit) -> Fault:
 
     def fault(value: object) -> tuple[str, str] | None:
         if not _is_number(value):
-            return "not-a-number", f"The value is {kind_of(value)}; expected {expected}."
+            advice = f" {WITHOUT_ESTIMATE}" if value is None or value == "" else ""
+            return "not-a-number", f"The value is {kind_of(value)}; expected {expected}.{advice}"
         # As the columnar reading sees it, a long whole number too.
         rule = broken_rule(float(value), unit=unit)
         return (rule.code, rule.message(value)) if rule else None

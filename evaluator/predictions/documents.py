@@ -65,6 +65,8 @@ def parse(data: bytes, *, max_members: int | None = None) -> object:
         if other is not None:
             raise other
         message = f"The file has up to {n_members:,} members and items; expected at most {max_members:,}."
+        if body.count(b"[") > n_members // 100:
+            message += " The values seem to be lists; expected one number for each sequence."
         raise reject("too-many-members", message)
     n_marks = body.count(b'"')
     if max_members is not None and n_marks > _MARKS_PER_MEMBER * max_members:

@@ -18,29 +18,43 @@ from evaluator.predictions.documents import Unit, kind_of
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A rule: `holds` for a number or elementwise for an array; {} in its texts is the value."""
+    """A rule: `holds` for a number or elementwise for an array; {} in its texts is the value.
+
+    `advice` is a sentence of what to write instead.
+    """
 
     code: str
     holds: Callable[[Any], Any]
     expected: str
     shown: str = "{}"
+    advice: str = ""
 
     def message(self, value: float) -> str:
-        return f"The value is {self.shown.format(kind_of(value))}; expected {self.expected}."
+        sentence = f"The value is {self.shown.format(kind_of(value))}; expected {self.expected}."
+        return f"{sentence} {self.advice}".rstrip()
 
 
+WITHOUT_ESTIMATE: Final = (
+    "A sequence without an estimate needs a value, too: for example the median of the other values."
+)
 _RATIO: Final = "a scale ratio greater than 0"
 
 RULES: Final[dict[Unit, tuple[Rule, ...]]] = {
     "ttc": (
         # NaN alone differs from itself.
-        Rule("nan", lambda value: value == value, "a number of seconds", "NaN"),  # noqa: PLR0124 -- as above
+        Rule(
+            "nan",
+            lambda value: value == value,  # noqa: PLR0124 -- as above
+            "a number of seconds",
+            "NaN",
+            WITHOUT_ESTIMATE,
+        ),
         Rule(
             "zero", lambda value: value != 0, "a time to contact other than 0, negative when moving away", "0"
         ),
     ),
     "scale_ratio": (
-        Rule("nan", lambda value: value == value, _RATIO, "NaN"),  # noqa: PLR0124 -- as above
+        Rule("nan", lambda value: value == value, _RATIO, "NaN", WITHOUT_ESTIMATE),  # noqa: PLR0124 -- as above
         Rule("not-positive", lambda value: value > 0, _RATIO),
     ),
 }

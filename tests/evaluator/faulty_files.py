@@ -4,6 +4,7 @@ import json
 import math
 from typing import Any
 
+from evaluator.predictions.values import WITHOUT_ESTIMATE
 from tests.evaluator.worlds import envelope, flat, make_truth
 
 MANIFEST = make_truth([4.0, -10.0, 1.0, 18.0]).manifest
@@ -273,7 +274,12 @@ CASES: dict[str, tuple[Any, ...]] = {
         f'The value is the string "5.3"; {EXPECTED_SECONDS}',
         "/1",
     ),
-    "a null": (text_with(_1="null"), "not-a-number", f"The value is null; {EXPECTED_SECONDS}", "/1"),
+    "a null": (
+        text_with(_1="null"),
+        "not-a-number",
+        f"The value is null; {EXPECTED_SECONDS} {WITHOUT_ESTIMATE}",
+        "/1",
+    ),
     "a boolean": (
         text_with(_1="true"),
         "not-a-number",
@@ -292,11 +298,11 @@ CASES: dict[str, tuple[Any, ...]] = {
         f"The value is an object; {EXPECTED_SECONDS}",
         "/1",
     ),
-    "NaN": (text_with(_1="NaN"), "nan", f"The value is NaN; {EXPECTED_SECONDS}", "/1"),
+    "NaN": (text_with(_1="NaN"), "nan", f"The value is NaN; {EXPECTED_SECONDS} {WITHOUT_ESTIMATE}", "/1"),
     "NaN among ratios": (
         envelope(RATIOS | {"1": math.nan}, unit="scale_ratio", fps=2),
         "nan",
-        "The value is NaN; expected a scale ratio greater than 0.",
+        f"The value is NaN; expected a scale ratio greater than 0. {WITHOUT_ESTIMATE}",
         "/predictions/1",
     ),
     "a zero": (text_with(_1="0"), "zero", NO_ZERO, "/1"),

@@ -22,7 +22,8 @@ def test_a_rejection_lists_its_problems_in_words_and_as_json() -> None:
         [Problem("nan", "The value is NaN; expected …", "/7"), Problem("zero", "…")], n_problems=9
     )
     assert (
-        str(rejected) == "9 problems; equal ones share a line:\n  1. /7: The value is NaN; expected …\n  2. …"
+        str(rejected)
+        == '9 problems; equal ones share a line:\n  1. "7": The value is NaN; expected …\n  2. …'
     )
     assert json.loads(rejected.to_json()) == {
         "n_problems": 9,
@@ -83,8 +84,8 @@ def test_equal_problems_share_a_line_that_names_their_pointers() -> None:
     with pytest.raises(Rejected) as rejected:
         findings.raise_if_any()
     zero, null = rejected.value.problems
-    assert (zero.where, zero.message) == ("/a", "0 1 more place has this problem: /b.")
-    pointers = ", ".join(f"/{row}" for row in range(1, 21))
+    assert (zero.where, zero.message) == ("/a", '0 1 more place has this problem: "b".')
+    pointers = ", ".join(f'"{row}"' for row in range(1, 21))
     more = f"28,599 more places have this problem: {pointers}, … (the first 20)."
     assert (null.where, null.message) == ("/0", f"The value is null. {more}")
     assert rejected.value.n_problems == 28_602

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Final, NamedTuple
 
+from evaluator.problems import plain_pointer
 from leaderboard.models import Evaluation, Status
 from leaderboard.submissions.progress import Progress
 from leaderboard.submissions.status_text import short_fault
@@ -73,7 +74,9 @@ def state_line(
 def _shown(problem: Mapping[str, str]) -> ShownProblem:
     message = problem["message"]
     fault = short_fault(message)
-    return ShownProblem(fault, message[len(fault) :], problem.get("where", ""), problem.get("code", ""))
+    return ShownProblem(
+        fault, message[len(fault) :], plain_pointer(problem.get("where", "")), problem.get("code", "")
+    )
 
 
 def _with_withdrawal(shown: tuple[Step, ...], at: datetime | None) -> tuple[Step, ...]:

@@ -146,7 +146,7 @@ def test_rejected_file_is_the_file_s_fault_with_numbered_problems(tsttc: Tsttc, 
     assert (result.exit_code, result.stdout) == (1, "")
     assert result.stderr.splitlines()[:3] == [
         "Error: The file is rejected: 2 problems.",
-        "  1. /8: The value is 0; expected another.",
+        '  1. "8": The value is 0; expected another.',
         "  2. The text is not JSON.",
     ]
     as_json = tsttc("status", ID, "--json")
