@@ -192,7 +192,7 @@ function correct(answer) {
     if (isWrong) field.closest("details")?.setAttribute("open", "");
     if (isWrong) first ??= entry;
   }
-  (first ?? button).focus();
+  (byId("form-errors").querySelector("input") ?? first ?? button).focus();
 }
 
 // What was filled in stays here. After signing in elsewhere the form needs a token of the new session.

@@ -308,6 +308,8 @@ def _announce(submission: Submission, *, site: str, err: bool) -> None:
     click.echo(printable(f"Submission {submission.id}{address}"), err=err)
     if not submission.is_new:
         click.echo("You already submitted this file; this is its first submission.", err=err)
+    for note in submission.notes:
+        click.echo(printable(f"Note: {note}"), err=True)
 
 
 def conclude(

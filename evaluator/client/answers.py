@@ -24,7 +24,7 @@ class Queue(msgspec.Struct, frozen=True):
 
 
 class Submission(msgspec.Struct, frozen=True, kw_only=True):
-    """A submission. `is_new` is False if the same file was submitted before.
+    """A submission. `is_new` is False if the same file was submitted before; `notes` name a probable slip.
 
     `rank` is its method's rank if the board shows this submission; a private method's is the rank it would
     have. With `awaits_intervals`, the intervals follow within seconds.
@@ -52,6 +52,7 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
     problems: list[Problem] = []
     n_problems: int | None = None
     queue: Queue | None = None
+    notes: list[str] = []
     is_new: bool = True
 
     @property

@@ -160,9 +160,15 @@ class SubmittedSerializer(SubmissionSerializer):
     """A new submission and the team's remaining quota."""
 
     quota = SlotsSerializer(help_text="The team's remaining quota after this submission.")
+    notes = serializers.ListField(
+        child=serializers.CharField(),
+        help_text="A probable slip in words: a new method whose name is like that of another one of the "
+        "team, or a file that the team submitted under another method.",
+    )
 
     def to_representation(self, instance: SubmissionView) -> dict[str, Any]:
         return {
             **super().to_representation(instance),
             "quota": SlotsSerializer(self.context["quota"]).data,
+            "notes": list(self.context["notes"]),
         }

@@ -63,7 +63,7 @@ class SubmissionsView(APIView):
         quota = usage.state(team=made.method.team, user=cast("User", request.user), split=made.split, now=now)
         (outcome,) = outcomes.for_submissions([made], now=now)
         return Response(
-            SubmittedSerializer(outcome, context={"quota": quota}).data,
+            SubmittedSerializer(outcome, context={"quota": quota, "notes": answer.notes}).data,
             status=201 if answer.is_new else 200,
             headers={"Location": absolute("api-submission", made.pk)},
         )

@@ -58,19 +58,22 @@ def read_predictions(
     manifest_path: Path,
     heartbeat: Callable[[], bool],
     heartbeat_s: float,
+    memory_bytes: int | None = None,
+    keeps_server: bool = True,
 ) -> Predictions:
     """Parse and align the prediction file with this digest in a child process.
 
-    Ends the child when `heartbeat`, called every `heartbeat_s` seconds, returns False. Raises
-    `evaluator.Rejected`, `ChildDied`, `ChildNotReady`, `LeaseLost`; `OSError` if no child could be started.
+    `keeps_server` leaves a process to each thread, which makes the next child quickly. Ends the child when
+    `heartbeat`, called every `heartbeat_s` seconds, returns False. Raises `evaluator.Rejected`, `ChildDied`,
+    `ChildNotReady`, `LeaseLost`; `OSError` if no child could be started.
     """
     _say_what_is_missing()
     request = {
         "manifest": str(manifest_path),
-        "memory_bytes": settings.CHILD_MEMORY_BYTES,
+        "memory_bytes": memory_bytes or settings.CHILD_MEMORY_BYTES,
         "cpu_s": (cpu_s := settings.CHILD_CPU_S + manifest.n_sequences // SEQUENCES_PER_CPU_S),
     }
-    read = _forked if fork_server.AVAILABLE else _spawned
+    read = _forked if fork_server.AVAILABLE and keeps_server else _spawned
     max_bytes = MAX_WORDS_BYTES + 8 * manifest.n_sequences
     try:
         reply = read(source, request, max_bytes=max_bytes, heartbeat=heartbeat, heartbeat_s=heartbeat_s)

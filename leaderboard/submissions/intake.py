@@ -13,6 +13,7 @@ from django.db.models import Q
 
 from evaluator.counting import file_size
 from evaluator.predictions.documents import EMPTY_MESSAGE
+from evaluator.spelling import similar_name
 from leaderboard import audit, board_versions
 from leaderboard.errors.refusals import Refused, clean_text, shown_split
 from leaderboard.methods import editing
@@ -69,10 +70,46 @@ class SubmissionRequest:
 
 @dataclass(frozen=True)
 class Submitted:
-    """The answer to a submission; `is_new` is False when the same bytes had come before."""
+    """The answer to a submission; `is_new` is False when the same bytes had come before.
+
+    `notes` are sentences about a new submission that may be a slip.
+    """
 
     submission: Submission
     is_new: bool
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstLook:
+    """What a request would do: a clean request, its file, and the submission of the same bytes, if any."""
+
+    request: SubmissionRequest
+    file: files.StoredFile
+    split: Split
+    team: Team | None
+    method: Method | None
+    sent_before: Submission | None
+
+    def notes(self) -> tuple[str, ...]:
+        """Say whether the name or the bytes are probably those of another method of the team."""
+        return tuple(note for note in (self._similar_name(), self._same_bytes()) if note)
+
+    def _similar_name(self) -> str:
+        if self.method is not None or self.team is None:
+            return ""
+        own = Method.objects.existing().filter(team=self.team).order_by("name")
+        similar = similar_name(self.request.method_name, own.values_list("name", flat=True))
+        return f"“{self.request.method_name}” is a new method; your team has “{similar}”." if similar else ""
+
+    def _same_bytes(self) -> str:
+        same = Submission.objects.active().filter(
+            split=self.split, method__team=self.team, **_sent_file(self.file, self.split)._asdict()
+        )
+        other = same.exclude(method=self.method).select_related("method").order_by("submitted_at").first()
+        if other is None:
+            return ""
+        return f"Your team submitted the same file to {self.split.title} before, as “{other.method.name}”."
 
 
 def submit(request: SubmissionRequest) -> Submitted:
@@ -82,16 +119,11 @@ def submit(request: SubmissionRequest) -> Submitted:
     takes nothing more. Details that differ replace the method's; without `may_edit` they are refused. Raises
     `Refused` or `usage.QuotaExceeded`; nothing is kept then.
     """
-    split = shown_split(request.split_name)
-    if split.current_edition is None:
-        _require_open(split, now=request.now)
-    request = request.cleaned()
-    upload = _checked(request.upload)
-    file = files.measure(upload)
-    team = teams.current_team_of(user=request.user)
-    answers = _answers(request, file, split=split, team=team)
-    if answers.sent_before is not None:
-        return Submitted(submission=answers.sent_before, is_new=False)
+    look = first_look(request)
+    if look.sent_before is not None:
+        return Submitted(submission=look.sent_before, is_new=False)
+    request, file, split, upload = look.request, look.file, look.split, _checked(request.upload)
+    notes = look.notes()
     files.save_predictions(upload, measured=file, now=request.now)
     with orphans.unless_refused(Refused, usage.QuotaExceeded, digest=file.digest), transaction.atomic():
         orphans.lock(file.digest)
@@ -107,7 +139,22 @@ def submit(request: SubmissionRequest) -> Submitted:
             digest=file.digest,
             size_bytes=file.size_bytes,
         )
+        return replace(submitted, notes=notes)
     return submitted
+
+
+def first_look(request: SubmissionRequest) -> FirstLook:
+    """Check a request and keep nothing. Raises as `submit`."""
+    split = shown_split(request.split_name)
+    if split.current_edition is None:
+        _require_open(split, now=request.now)
+    request = request.cleaned()
+    file = files.measure(_checked(request.upload))
+    team = teams.current_team_of(user=request.user)
+    method, sent_before, _ = _answers(request, file, split=split, team=team)
+    return FirstLook(
+        request=request, file=file, split=split, team=team, method=method, sent_before=sent_before
+    )
 
 
 class _Answers(NamedTuple):

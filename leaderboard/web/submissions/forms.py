@@ -17,8 +17,9 @@ from leaderboard.methods import visibility
 from leaderboard.models import Method, Split, Submission, User
 from leaderboard.people import teams
 from leaderboard.quotas import admissions, usage
-from leaderboard.submissions import search
+from leaderboard.submissions import questions, search
 from leaderboard.submissions.intake import SubmissionRequest
+from leaderboard.submissions.questions import Question
 from leaderboard.web.methods.method_forms import DetailsForm
 
 
@@ -69,6 +70,7 @@ class SubmissionForm(DetailsForm):
         ),
     )
 
+    confirmed = forms.CharField(required=False, widget=forms.HiddenInput())
     note = forms.CharField(
         required=False,
         help_text="Optional. Only your team sees it.",
@@ -80,6 +82,7 @@ class SubmissionForm(DetailsForm):
         super().__init__(
             sent[0], sent[1], initial={"split": self._split_to_mark, "method": request.GET.get("method", "")}
         )
+        self.question: Question | None = None
         self._user = user
         self._preferred = request.GET.get("split", "")
         self.max_bytes = settings.MAX_PREDICTIONS_BYTES
@@ -122,6 +125,14 @@ class SubmissionForm(DetailsForm):
         """Tell whether the details are open: for a first method, and with text or an error."""
         fields = (*self.described, *self.detailed)
         return not self.methods or any(field.value() or field.errors for field in fields)
+
+    def asks(self, request: SubmissionRequest) -> bool:
+        """Tell whether something is asked first that is not confirmed. Raises as `intake.submit`."""
+        asked = questions.question(request)
+        if asked is None or self.cleaned_data["confirmed"] == asked.answer:
+            return False
+        self.question = asked
+        return True
 
     def submission_request(self, *, now: datetime) -> SubmissionRequest:
         """Make the request of the valid form."""

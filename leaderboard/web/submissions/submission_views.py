@@ -51,15 +51,18 @@ def submit(request: HttpRequest) -> HttpResponse:
     user = cast("User", request.user)
     form = SubmissionForm(user, request)
     if request.method == "POST" and form.is_valid():
+        asked_for = form.submission_request(now=timezone.now())
         try:
-            submitted = intake.submit(form.submission_request(now=timezone.now()))
+            submitted = None if form.asks(asked_for) else intake.submit(asked_for)
         except (intake.Refused, usage.QuotaExceeded) as refusal:
             form.refuse(refusal)
-        else:
+            submitted = None
+        if submitted is not None:
             if not submitted.is_new:
                 messages.info(request, "You already submitted this file. Here is its result.")
             return _taken(request, submitted.submission)
-    return render(request, "submissions/submit.html", {"form": form}, status=422 if form.errors else 200)
+    is_sent = not form.errors and form.question is None
+    return render(request, "submissions/submit.html", {"form": form}, status=200 if is_sent else 422)
 
 
 def _taken(request: HttpRequest, taken: Submission) -> HttpResponse:

@@ -11,6 +11,7 @@ from django.utils import timezone
 from pytest_django import Settings
 
 import evaluator
+from evaluator.predictions import plausibility
 from leaderboard.models import Edition, Split, Submission, User
 from leaderboard.storage import manifests
 from leaderboard.web.decorators import SESSION_ENDED
@@ -215,3 +216,80 @@ def test_announced_excess_is_answered_413_without_reading(
     response = send(signed_in, b"x" * 200_000)
     assert response.status_code == 413
     assert "expected at most 1 kB" in pages.page(response).one("main").text
+
+
+# --- asked first: a slot, or what goes public, does not come back -------------------------------------------
+
+
+def question_of(response: HttpResponseBase) -> tuple[str, str]:
+    """The words of the question, and the value that answers it; nothing was submitted."""
+    assert response.status_code == 422
+    asked = pages.page(response).one("div", class_="question")
+    return asked.text, asked.one("input", type="checkbox", name="confirmed").attributes["value"]
+
+
+def constant(edition: Edition, value: float) -> bytes:
+    manifest = manifests.load(edition.ground_truth.manifest_digest)
+    return json.dumps({str(row): value for row in manifest.anno_id.tolist()}).encode()
+
+
+def test_a_file_with_a_warning_is_submitted_once_that_is_confirmed(
+    signed_in: Client, edition: Edition, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(plausibility, "MIN_VALUES", 1)
+    files = [constant(edition, value) for value in (2500.0, 2600.0)]
+    words, answer = question_of(send(signed_in, files[0]))
+    assert "Nothing is submitted yet." in words
+    assert "milliseconds" in words
+    question_of(send(signed_in, files[1], confirmed=answer))
+    assert not Submission.objects.exists()
+    assert send(signed_in, files[0], confirmed=answer).status_code == 302
+    assert send(signed_in, files[0]).status_code == 302, "a file that is there is no question"
+    assert Submission.objects.count() == 1
+
+
+def test_a_file_that_cannot_be_read_is_left_to_the_worker(
+    signed_in: Client, edition: Edition, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(plausibility, "MIN_VALUES", 1)
+    assert send(signed_in, b"[").status_code == 302
+
+
+@pytest.mark.parametrize("visibility", ["PUBLIC", "ANONYMOUS"])
+def test_a_file_of_a_method_that_others_see_is_asked_about(
+    signed_in: Client, edition: Edition, owner: User, visibility: str
+) -> None:
+    builders.submit(owner, builders.predictions(edition), method="Mine", visibility=visibility)
+    data = builders.predictions(edition, factor=1.2)
+    words, answer = question_of(send(signed_in, data, method="Mine"))
+    assert "everyone sees its results on every split" in words
+    assert Submission.objects.count() == 1
+    assert send(signed_in, data, method="Mine", confirmed=answer).status_code == 302
+
+
+def test_a_name_like_another_one_and_bytes_of_another_method_are_asked_about(
+    signed_in: Client, edition: Edition, owner: User, stranger: User
+) -> None:
+    data = builders.predictions(edition)
+    builders.submit(owner, data, method="TTC-Former", visibility="PRIVATE")
+    builders.submit(stranger, data, method="Neighbour", visibility="PRIVATE")
+    words, answer = question_of(send(signed_in, data, method="TTC-Fromer"))
+    assert "“TTC-Fromer” is a new method; your team has “TTC-Former”." in words
+    assert "the same file to Test before, as “TTC-Former”." in words
+    question_of(send(signed_in, data, method="TTC-Formr", confirmed=answer))
+    question_of(send(signed_in, builders.predictions(edition, factor=1.2), method="TTC-Fromer"))
+    assert "Neighbour" not in question_of(send(signed_in, data, method="Other"))[0]
+    other = builders.predictions(edition, factor=1.3)
+    assert send(signed_in, other, method="Neighbor").status_code == 302, "another team's name"
+    assert send(signed_in, data, method="TTC-Fromer", confirmed=answer).status_code == 302
+    api = {"split": "test", "method": "TTC-Forme", "file": SimpleUploadedFile("p.json", data)}
+    notes = signed_in.post("/api/v1/submissions", api).json()["notes"]
+    assert len(notes) == 2
+
+
+def test_a_refusal_comes_before_a_question(signed_in: Client, edition: Edition, owner: User) -> None:
+    builders.submit(owner, builders.predictions(edition), method="Mine")
+    Split.objects.filter(pk="test").update(closes_at=timezone.now())
+    response = send(signed_in, builders.predictions(edition, factor=1.2), method="Mine")
+    assert "closed at" in pages.page(response).text
+    assert not pages.page(response).all("div", class_="question")
