@@ -10,6 +10,7 @@ from rest_framework import exceptions
 from rest_framework.permissions import SAFE_METHODS, BasePermission
 from rest_framework.request import Request
 
+from leaderboard.api import request_faults
 from leaderboard.models import ApiToken, Scope, User
 from leaderboard.people import second_factor, tokens
 
@@ -23,6 +24,9 @@ class BearerAuthentication(TokenAuthentication):
 
     def authenticate(self, request: Request) -> tuple[User, ApiToken] | None:
         """Return user and token. Raises `AuthenticationFailed`, or `PermissionDenied` beyond its limits."""
+        words = request.META.get("HTTP_AUTHORIZATION", "").split()
+        if words and words[0].lower() == "bearer" and len(words) != 2:
+            raise exceptions.AuthenticationFailed(request_faults.of_token(request))
         user_and_token: tuple[User, ApiToken] | None = super().authenticate(request)
         if user_and_token is not None:
             view = request.parser_context["view"]

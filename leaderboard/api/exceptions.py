@@ -12,6 +12,7 @@ from rest_framework.response import Response
 from rest_framework.views import APIView
 from rest_framework.views import exception_handler as default_handler
 
+from leaderboard.api import request_faults
 from leaderboard.api.throttling import UnauthorizedThrottle
 from leaderboard.boards import filters, listing
 from leaderboard.errors import outages, problem_codes
@@ -128,7 +129,8 @@ def _bad_request(exc: Exception) -> Response | None:
 def _framework_error(exc: Exception, context: dict[str, Any]) -> Response | None:
     match exc:
         case Http404():
-            exc = exceptions.NotFound("There is nothing at this address that you may see.")
+            meant = request_faults.of_unknown_address(context["request"].path)
+            exc = exceptions.NotFound(meant or "There is nothing at this address that you may see.")
         case PermissionDenied():
             exc = exceptions.PermissionDenied()
     response = default_handler(exc, context)
@@ -137,20 +139,34 @@ def _framework_error(exc: Exception, context: dict[str, Any]) -> Response | None
     codes = exc.get_codes() if isinstance(exc, exceptions.APIException) else "invalid"
     code = (codes if isinstance(codes, str) else "invalid").replace("_", "-")
     headers = {name: value for name, value in response.items() if name != "Content-Type"}
-    return problem(status=response.status_code, code=code, detail=_sentence(exc), headers=headers)
+    return problem(status=response.status_code, code=code, detail=_sentence(exc, context), headers=headers)
 
 
-def _sentence(exc: Exception) -> str:
-    if isinstance(exc, exceptions.Throttled):
-        wait_s: float = getattr(exc, "wait", None) or 0
-        return rate_limits.refusal(wait_s)
-    detail = getattr(exc, "detail", "")
-    text = (
-        str(detail)
-        if isinstance(detail, str)
-        else "; ".join(f"{key}: {text}" for key, text in dict(detail).items())
-    )
+def _sentence(exc: Exception, context: dict[str, Any]) -> str:
+    request, view = context["request"], context["view"]
+    match exc:
+        case exceptions.Throttled():
+            return rate_limits.refusal(getattr(exc, "wait", None) or 0)
+        case exceptions.NotAuthenticated():
+            text = request_faults.of_token(request)
+        case exceptions.UnsupportedMediaType():
+            text = request_faults.of_media_type(exc, request)
+        case exceptions.ParseError():
+            text = request_faults.of_body(exc)
+        case exceptions.MethodNotAllowed():
+            text = request_faults.of_method(request, view)
+        case exceptions.NotAcceptable():
+            text = request_faults.of_accept(request, view)
+        case _:
+            text = _detail(exc)
     return text if text.endswith(".") else f"{text}."
+
+
+def _detail(exc: Exception) -> str:
+    detail = getattr(exc, "detail", "")
+    if isinstance(detail, str):
+        return str(detail)
+    return "; ".join(f"{key}: {text}" for key, text in dict(detail).items())
 
 
 class UnknownAddressView(APIView):

@@ -3,9 +3,10 @@
 import io
 import json
 from collections.abc import Mapping
-from typing import IO, Any, Final
+from typing import IO, Any, Final, cast
 
 from django.conf import settings
+from django.utils.http import parse_header_parameters
 from rest_framework import exceptions
 from rest_framework.parsers import DataAndFiles, JSONParser, MultiPartParser
 from rest_framework.renderers import JSONRenderer
@@ -14,6 +15,10 @@ from leaderboard.errors.refusals import Refused
 
 MAX_BYTES: Final = 100_000
 """All details of a method take a third of it, even with every character escaped."""
+
+
+_MAX_END: Final = 1_000
+CUT_OFF: Final = "The body ends before the last boundary of its form; expected a complete form."
 
 
 class BodyTooLarge(exceptions.APIException):
@@ -57,6 +62,30 @@ def _doubled(name: str, *, n_given: int) -> Refused:
     return Refused("doubled-field", sentence, field=name[:60])
 
 
+class _Body:
+    """A body that is read once; it knows its end."""
+
+    def __init__(self, stream: IO[Any]) -> None:
+        self._stream, self._end = stream, b""
+
+    def read(self, size: int = -1) -> bytes:
+        data: bytes = self._stream.read(size)
+        self._end = (self._end + data[-_MAX_END:])[-_MAX_END:]
+        return data
+
+    def is_complete(self, content_type: str) -> bool:
+        """Say whether the body ends with the last boundary of a form; Django reads one without it, too."""
+        boundary = parse_header_parameters(content_type)[1].get("boundary", "").encode("latin-1", "replace")
+        return b"--" + boundary + b"--" in self._end
+
+
+def _close_files(parsed: "DataAndFiles[Any, Any]") -> None:
+    # Django closes those of the requests that it knows.
+    for _, files in parsed.files.lists():
+        for file in files:
+            file.close()
+
+
 class SingleMultiPartParser(MultiPartParser):
     """A multipart form in which each field comes once, as a text or a file."""
 
@@ -66,13 +95,15 @@ class SingleMultiPartParser(MultiPartParser):
         media_type: str | None = None,
         parser_context: Mapping[str, Any] | None = None,
     ) -> "DataAndFiles[Any, Any]":
-        parsed = super().parse(stream, media_type, parser_context)
+        body = _Body(stream)
+        parsed = super().parse(cast("IO[Any]", body), media_type, parser_context)
+        if not body.is_complete(str(media_type)):
+            _close_files(parsed)
+            raise exceptions.ParseError(CUT_OFF)
         for name in [*parsed.data, *parsed.files]:
             n_given = len(parsed.data.getlist(name)) + len(parsed.files.getlist(name))
             if n_given > 1:
-                for _, files in parsed.files.lists():  # Django closes those of the requests that it knows
-                    for file in files:
-                        file.close()
+                _close_files(parsed)
                 raise _doubled(name, n_given=n_given)
         return parsed
 

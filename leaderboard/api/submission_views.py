@@ -25,11 +25,13 @@ from leaderboard.api.submission_serializers import (
 )
 from leaderboard.api.throttling import SubmitThrottle
 from leaderboard.api.views import visible
+from leaderboard.errors.refusals import Refused
 from leaderboard.methods import editing
 from leaderboard.models import Evaluation, Submission, User
 from leaderboard.quotas import usage
 from leaderboard.submissions import intake, outcomes
 
+FILE_AS_TEXT = "The field 'file' is a text; expected a file. With curl: -F file=@FILE, with an @."
 DETAIL_FIELDS = ("description", "paper_url", "code_url")
 # While a submission waits or runs; a file is scored within a second.
 ASK_AGAIN_S = 1
@@ -106,6 +108,8 @@ class SubmissionView(APIView):
 
 def _submission_request(request: Request, form: QueryDict, *, now: datetime) -> intake.SubmissionRequest:
     user, upload = cast("User", request.user), request.FILES.get("file")
+    if upload is None and "file" in form:
+        raise Refused("no-file", FILE_AS_TEXT, field="file")
     return intake.SubmissionRequest(
         user=user,
         split_name=str(form.get("split", "")),

@@ -95,7 +95,7 @@ def test_a_hostile_key_is_answered_without_guessing() -> None:
     assert "Probably" not in problems_of(keys)["unknown-keys"].message
 
 
-def test_a_place_is_a_plain_key_for_people_and_a_pointer_for_programs() -> None:
+def test_a_pointer_is_a_plain_key_for_people() -> None:
     text = json.dumps(dict.fromkeys(KEYS, 5.0) | {KEYS[0]: 0, KEYS[1]: 0})
     with pytest.raises(Rejected) as rejected:
         read_predictions(text.encode(), manifest=MANIFEST)

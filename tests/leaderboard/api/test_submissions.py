@@ -10,6 +10,7 @@ from django.utils import timezone
 from rest_framework.test import APIClient
 
 from evaluator.metrics.protocol import SCORE_NAMES
+from evaluator.problems import pointer
 from leaderboard.models import Edition, Method, Split, Submission, User
 from tests import builders
 
@@ -58,14 +59,15 @@ def test_rejected_submission_lists_problems_with_code_message_and_where(
 ) -> None:
     client = client_of(owner)
     good = json.loads(builders.predictions(edition))
-    submitted = post(client, json.dumps({**good, "7": "x"}).encode()).json()
+    key = next(iter(good))
+    submitted = post(client, json.dumps({**good, key: "x"}).encode()).json()
     builders.score_all()
     body = client.get(f"/api/v1/submissions/{submitted['id']}").json()
     assert body["state"] == "REJECTED"
     assert body["scores"] is None
     [problem] = body["problems"]
     assert set(problem) == {"code", "message", "where"}
-    assert (problem["code"], problem["where"]) == ("not-a-number", "/7")
+    assert (problem["code"], problem["where"]) == ("not-a-number", pointer(key))
 
 
 def test_list_has_the_teams_submissions_newest_first(edition: Edition, owner: User, teammate: User) -> None:
