@@ -10,6 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from evaluator.hidden_files import is_hidden
 from evaluator.problems import Problem, Rejected
 from evaluator.receipts import NotVerified, read_keys, verify
 
@@ -88,5 +89,7 @@ def _list(folder: Path) -> tuple[dict[str, str], str, str]:
 
 
 def _digests(folder: Path) -> dict[str, str]:
-    paths = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    names = {path: path.relative_to(folder) for path in files}
+    paths = {names[path].as_posix(): path for path in files if not is_hidden(names[path])}
     return {name: f"sha256:{sha256(paths[name].read_bytes()).hexdigest()}" for name in sorted(paths)}

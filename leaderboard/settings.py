@@ -387,6 +387,7 @@ METRICS_NETWORKS = environment.networks("TSTTC_METRICS_NETWORKS", default=["127.
 CONTENT_SECURITY_POLICY = middleware_order.content_security_policy(SOCIALACCOUNT_PROVIDERS)
 SESSION_ENGINE = "leaderboard.web.middleware.sessions"
 CSRF_COOKIE_HTTPONLY = True
+CSRF_FAILURE_VIEW = "leaderboard.web.error_pages.form_refused"
 # Below /api/ http is refused: a client would take a redirect for success, or follow it without the file.
 SECURE_REDIRECT_EXEMPT = [r"^healthz$", r"^readyz$", r"^healthy$", r"^metrics$", r"^api/"]
 if PRODUCTION and env.bool("TSTTC_HTTPS", default=True):

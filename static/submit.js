@@ -47,7 +47,7 @@ async function check() {
   byId("chosen").textContent = file ? fileSize(file.size) : "";
   if (!file) return conclude("");
   if (file.size > maxBytes) {
-    const sentence = `The file is ${fileSize(file.size)}; expected at most ${fileSize(maxBytes)}.`;
+    const sentence = `The file is ${fileSize(file.size)}; expected at most ${fileSize(maxBytes)}. gzip makes a prediction file much smaller: send FILE.json.gz.`;
     input.setCustomValidity(sentence);
     return conclude("too large", sentence);
   }

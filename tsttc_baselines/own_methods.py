@@ -19,6 +19,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, Final
 
+from evaluator.hidden_files import is_hidden
 from tsttc_baselines.methods import METHODS, Method, Parameter, Value
 
 GROUP: Final = "tsttc.methods"
@@ -113,7 +114,10 @@ def code_of(method: Method) -> dict[str, str]:
     """The factory, and the SHA-256 of the Python files of its package, which say what ran."""
     top = import_module(_package(method.factory))
     folders = [Path(folder) for folder in getattr(top, "__path__", ())]
-    files = sorted(file for folder in folders for file in folder.rglob("*.py")) or [Path(str(top.__file__))]
+    sources = [
+        file for folder in folders for file in folder.rglob("*.py") if not is_hidden(file.relative_to(folder))
+    ]
+    files = sorted(sources) or [Path(str(top.__file__))]
     digest = hashlib.sha256()
     for file in files:
         digest.update(file.name.encode() + b"\0" + file.read_bytes())

@@ -193,12 +193,14 @@ def exit_code_of(error: Refused) -> Exit:
 def _words_for(error: Refused) -> str:
     # A proxy answers with no problem document.
     if error.status >= 500:
-        return f"The server failed ({error.status}: {error.title}). This is not your fault."
+        return f"The server failed ({error.status}: {error.title})."
     if error.status in {401, 403}:
         return f"The server does not accept the token ({error.status}: {error.title})."
     if error.status == 413:
-        size = "its page “Submit” says how large a file may be"
-        return f"The server takes no file of this size ({error.status}: {error.title}); {size}."
+        return (
+            f"The server takes no file of this size ({error.status}: {error.title}); its page “Submit” says "
+            "how large a file may be. gzip makes a prediction file much smaller: send FILE.json.gz."
+        )
     return f"The server refused ({error.status}: {error.title})."
 
 
@@ -209,7 +211,10 @@ def _hint_for(error: Refused, *, url: str) -> str:
     if error.status == 403 and error.code in TOKENS_INSTEAD:
         return f"{TOKENS_INSTEAD[error.code]} at {url.rstrip('/')}/tokens/"
     if error.status == 404 and error.code != "no-ground-truth":
-        return "Check the name, or the id, and --server."
+        path = urlsplit(url).path.strip("/")
+        site = url.rstrip("/").removesuffix(path).rstrip("/")
+        elsewhere = f" The address is that of the site, such as {site}." if path else ""
+        return f"Check the name, or the id, and --server.{elsewhere}"
     if error.status == 429:
         return again or "Show your quota with: tsttc quota"
     if error.status >= 500:

@@ -54,8 +54,9 @@ def check(
 ) -> None:
     """Check whether PREDICTIONS, a prediction file or - for standard input, is complete and well-formed.
 
-    The command uses the rules of the server and sends nothing. A warning is not an error: the values probably
-    belong to other sequences. Without --manifest, --annotations defines the sequences.
+    The command uses the rules of the server, also its limit of 20 MB, and sends nothing. A warning is not an
+    error: the values probably belong to other sequences. Without --manifest, --annotations defines the
+    sequences.
 
     \b
     Examples:
@@ -63,11 +64,12 @@ def check(
       tsttc check results.json --annotations annotations/val/
     """
     from evaluator import read_predictions  # noqa: PLC0415 -- numpy, which --help can do without
+    from evaluator.predictions.documents import MAX_FILE_BYTES  # noqa: PLC0415 -- as above
     from evaluator.predictions.plausibility import warnings_of  # noqa: PLC0415 -- as above
 
     sequences, numbering = _sequences(manifest_path, annotations)
     with naming(predictions):
-        parsed = read_predictions(predictions_of(predictions), manifest=sequences)
+        parsed = read_predictions(predictions_of(predictions), manifest=sequences, max_bytes=MAX_FILE_BYTES)
     warnings = warnings_of(parsed)
     if numbering is not None and annotations is not None:
         warnings += numbering_warnings(numbering, parsed, predictions=predictions, annotations=annotations)

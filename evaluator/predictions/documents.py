@@ -11,6 +11,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from evaluator.counting import file_size
 from evaluator.predictions import headers
 from evaluator.predictions.recognition import is_printed_dict
 from evaluator.problems import Findings, pointer, quoted, reject
@@ -26,6 +27,18 @@ FIELDS: Final = ("unit", "fps", "frame_gap", "meta", "predictions")
 _STRING: Final = re.compile(rb'"(?:[^"\\]|\\.)*+(?:"|\\?\Z)', re.DOTALL)
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 EMPTY_MESSAGE: Final = "The file is empty; expected JSON text with a number for every sequence."
+
+
+MAX_FILE_BYTES: Final = 20_000_000
+"""What a leaderboard takes at most, counted as sent: of a gzip archive, the compressed bytes."""
+
+
+def too_large(*, n_bytes: int, max_bytes: int) -> str:
+    """Word the refusal of a large file, the same on page, API and command line."""
+    return (
+        f"The file is {file_size(n_bytes)}; expected at most {file_size(max_bytes)}. "
+        "gzip makes a prediction file much smaller: send FILE.json.gz."
+    )
 
 
 class Members(list[tuple[str, object]]):

@@ -19,12 +19,12 @@ from numpy.typing import ArrayLike
 
 from evaluator.arguments import Source, data_of, require
 from evaluator.arrays import as_floats, in_row_order
-from evaluator.counting import counted, file_size
+from evaluator.counting import counted
 from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
 from evaluator.predictions import headers, recognition
 from evaluator.predictions.alignment import read_slowly
 from evaluator.predictions.columns import read_column
-from evaluator.predictions.documents import Unit
+from evaluator.predictions.documents import Unit, too_large
 from evaluator.predictions.parquet import as_sent
 from evaluator.predictions.writing import rate_of, require_values
 from evaluator.problems import pointer, reject
@@ -126,16 +126,14 @@ class Predictions:
 def read_predictions(source: Source, *, manifest: Manifest, max_bytes: int | None = None) -> Predictions:
     """Read a prediction file and align it with `manifest`; raises `Rejected` with every fault.
 
-    `source` is a path, bytes or an open file of at most `max_bytes` (None: no limit), in any form. The
-    digest is that of the bytes; for a Parquet table, that of its JSON form. Raises `ModuleNotFoundError` for
-    a Parquet table without pyarrow.
+    `source` is a path, bytes or an open file, in any form, of at most `max_bytes` as it is: a leaderboard
+    takes 20,000,000, and None means no limit. The digest is that of the bytes; for a Parquet table, that of
+    its JSON form. Raises `ModuleNotFoundError` for a Parquet table without pyarrow.
     """
     require(manifest, Manifest, name="manifest")
     data = data_of(source)
     if max_bytes is not None and len(data) > max_bytes:
-        raise reject(
-            "too-large", f"The file has {file_size(len(data))}; expected at most {file_size(max_bytes)}."
-        )
+        raise reject("too-large", too_large(n_bytes=len(data), max_bytes=max_bytes))
     return read_sent(as_sent(data), manifest=manifest)
 
 
@@ -238,13 +236,15 @@ def _of_table(data: bytes, *, max_rows: int | None) -> bytes:
     except UnicodeDecodeError as error:
         message = f"Byte {error.start:,} of the table is not UTF-8; expected CSV text encoded in UTF-8."
         raise reject("not-utf8", message, f"byte {error.start}") from None
-    rows = csv.reader(_lines(text.lstrip(), max_rows=max_rows), strict=True)
+    body = text.lstrip()
+    n_before = text[: len(text) - len(body)].count("\n")
+    rows = csv.reader(_lines(body, max_rows=max_rows), strict=True)
     try:
         header = [name.strip() for name in next(rows)]
-        return document_of(header, _checked(rows, n_fields=len(header)))
+        return document_of(header, _checked(rows, n_fields=len(header), n_before=n_before))
     except csv.Error as error:
         message = f"This is not a CSV table: {error}."
-        raise reject("bad-csv", message, f"line {rows.line_num}") from None
+        raise reject("bad-csv", message, f"line {n_before + rows.line_num}") from None
 
 
 def _lines(text: str, *, max_rows: int | None) -> Iterator[str]:
@@ -260,11 +260,12 @@ def _lines(text: str, *, max_rows: int | None) -> Iterator[str]:
         yield line
 
 
-def _checked(rows: Iterator[list[str]], *, n_fields: int) -> Iterator[list[str]]:
-    for number, row in enumerate(filter(None, rows), start=1):
+def _checked(rows: Any, *, n_fields: int, n_before: int) -> Iterator[list[str]]:
+    """Yield the rows of a CSV reader that are not empty; `n_before` lines precede its text."""
+    for row in filter(None, rows):
         if len(row) != n_fields:
             message = f"The row has {len(row)} fields; expected {n_fields}, as the header."
-            raise reject("bad-csv", message, f"row {number}")
+            raise reject("bad-csv", message, f"line {n_before + rows.line_num}")
         yield row
 
 

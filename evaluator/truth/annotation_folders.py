@@ -21,6 +21,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, Final
 
+from evaluator.hidden_files import is_hidden
 from evaluator.problems import Rejected, reject
 from evaluator.truth.annotations import AnnotatedFiles, read_files
 from evaluator.truth.csv_tables import Table
@@ -89,7 +90,8 @@ def list_files(folder: Path) -> list[Path]:
         for name in names
         if os.path.splitext(name)[1] == _EXTENSION  # noqa: PTH122 -- the toolkit's own question
     ]
-    return [path for path in paths if path.is_file()]
+    # Of hidden files, the toolkit reads none that is an annotation file.
+    return [path for path in paths if path.is_file() and not is_hidden(path.relative_to(folder))]
 
 
 def _contents(folder: Path, files: Sequence[Path]) -> Iterator[tuple[str, bytes]]:

@@ -11,7 +11,7 @@ from django.core.files.base import File
 from django.db import transaction
 from django.db.models import Q
 
-from evaluator.counting import file_size
+from evaluator.predictions import documents
 from evaluator.predictions.documents import EMPTY_MESSAGE
 from evaluator.spelling import similar_name
 from leaderboard import audit, board_versions
@@ -269,11 +269,7 @@ def _checked(upload: "File[bytes] | None") -> "File[bytes]":
 
 
 def too_large(*, n_bytes: int) -> str:
-    most = settings.MAX_PREDICTIONS_BYTES
-    return (
-        f"The file is {file_size(n_bytes)}; expected at most {file_size(most)}. "
-        "gzip makes a prediction file much smaller: send FILE.json.gz."
-    )
+    return documents.too_large(n_bytes=n_bytes, max_bytes=settings.MAX_PREDICTIONS_BYTES)
 
 
 def _clean_filename(name: str) -> str:

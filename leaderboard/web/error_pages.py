@@ -1,14 +1,24 @@
 """The pages for a failure of the server and for a malformed request."""
 
 import sys
+from typing import Final
 
 from django.conf import settings
 from django.http import HttpRequest, HttpResponse, HttpResponseBadRequest, HttpResponseServerError
+from django.middleware import csrf
+from django.shortcuts import render
 from django.template.loader import render_to_string
 
 from leaderboard.errors import outages, problem_codes
 
 SORRY = "This was an error on our side. We logged it; try again later."
+
+_CAUSES: Final = {
+    csrf.REASON_NO_CSRF_COOKIE: "cookie",
+    csrf.REASON_NO_REFERER: "referer",
+    csrf.REASON_MALFORMED_REFERER: "referer",
+    csrf.REASON_INSECURE_REFERER: "referer",
+}
 
 
 def server_error(request: HttpRequest) -> HttpResponse:
@@ -25,6 +35,16 @@ def server_error(request: HttpRequest) -> HttpResponse:
         return HttpResponseServerError(render_to_string("500.html", {"benchmark": settings.BENCHMARK}))
     page = render_to_string("outage.html", {"outage": outage, "benchmark": settings.BENCHMARK})
     return HttpResponse(page, status=outage.status, headers=outage.headers)
+
+
+def form_refused(request: HttpRequest, reason: str = "") -> HttpResponse:
+    """Refuse a form without a valid token: from another origin, without cookie or Referer, or an old one."""
+    cause = _CAUSES.get(reason, "form")
+    if cause == "form" and reason.startswith(("Origin checking", "Referer checking")):
+        cause = "origin"
+    origin = request.headers.get("Origin") or request.headers.get("Referer", "")
+    context = {"cause": cause, "origin": origin[:200], "host": request.get_host()}
+    return render(request, "403_csrf.html", context, status=403)
 
 
 def bad_request(request: HttpRequest, exception: Exception) -> HttpResponse:

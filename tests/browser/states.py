@@ -88,7 +88,7 @@ def failures() -> str:
     pages: dict[str, tuple[str, dict[str, Any]]] = {
         "failure-400": ("400.html", {}),
         "failure-403": ("403.html", signed_in),
-        "failure-403-form": ("403_csrf.html", {}),
+        "failure-403-form": ("403_csrf.html", {"cause": "form"}),
         "failure-413": ("413.html", too_large | signed_in),
         "failure-429": ("429.html", too_many),
         "failure-500": ("500.html", {}),

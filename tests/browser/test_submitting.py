@@ -10,6 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 
 import evaluator
 from evaluator.counting import file_size
+from evaluator.predictions.documents import too_large
 from tests.browser.chromium import tab_to
 from tests.browser.conftest import MAX_PREDICTIONS_BYTES, PASSWORD, NewPage, sign_up, submit
 from tests.browser.site import predictions, worker
@@ -275,7 +276,7 @@ def test_file_over_the_limit_is_stopped_before_it_is_sent(page: Page, truth: eva
     field = page.get_by_label("Prediction file")
     page.get_by_label("Method", exact=True).fill("Large")
     field.set_input_files({"name": "p.json", "mimeType": "application/json", "buffer": b"1" * 250_000})
-    sentence = f"The file is 250 kB; expected at most {MAX_PREDICTIONS_BYTES // 1000} kB."
+    sentence = too_large(n_bytes=250_000, max_bytes=MAX_PREDICTIONS_BYTES)
     expect(page.locator("#checked .bad")).to_have_text(sentence)
     page.get_by_role("button", name="Submit").click()
     assert field.evaluate("e => e.validationMessage") == sentence

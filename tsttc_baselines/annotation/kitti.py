@@ -11,6 +11,7 @@ import math
 from pathlib import Path
 from typing import Final
 
+from evaluator.hidden_files import is_hidden
 from evaluator.problems import quoted, reject
 from evaluator.truth.annotations import FRAME_STEP_NS
 from evaluator.truth.csv_tables import name_fault, read_text
@@ -30,7 +31,7 @@ def read_kitti(folder: Path) -> Tracks:
     rows.
     """
     # Recordings are named by file stem; the camera is 2, ts the frame's number · 10⁸ ns.
-    files = sorted(folder.glob("*.txt"))
+    files = sorted(path for path in folder.glob("*.txt") if not is_hidden(path.relative_to(folder)))
     if not files:
         message = "The folder has no label files; expected KITTI tracking labels, one *.txt for a recording."
         raise reject("unreadable", message, folder.name)

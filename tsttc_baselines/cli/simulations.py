@@ -177,7 +177,8 @@ def render(
 
 def _require_empty(folder: Path) -> None:
     try:
-        entry = next(folder.iterdir(), None) if folder.exists() else None
+        entries = folder.iterdir() if folder.exists() else iter(())
+        entry = next((each for each in entries if each.name != ".DS_Store"), None)
     except OSError as error:
         message = f"{folder} cannot be read: {error.strerror}."
         raise click.BadParameter(message, param_hint="FOLDER") from None

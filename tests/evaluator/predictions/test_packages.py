@@ -69,7 +69,7 @@ def test_gzip_is_unpacked_all_its_members_and_named_by_the_bytes_that_were_sent(
         (table("ttc", "note"), "missing-columns", "expected anno_id, or bag_stamp", "line 1"),
         (b"anno_id;ttc\n0;1\n", "bad-csv", "are separated by semicolons; expected commas.", "line 1"),
         (b"anno_id\tttc\n0\t1\n", "bad-csv", "are separated by tabs; expected commas.", "line 1"),
-        (b"anno_id,ttc\n0,1,2\n", "bad-csv", "The row has 3 fields; expected 2, as the header.", "row 1"),
+        (b"anno_id,ttc\n0,1,2\n", "bad-csv", "The row has 3 fields; expected 2, as the header.", "line 2"),
         (b'anno_id,ttc\n0,"1\n', "bad-csv", "This is not a CSV table: unexpected end of data.", "line 2"),
         (b"anno_id,ttc\n0,\xff\n", "not-utf8", "Byte 14 of the table is not UTF-8", "byte 14"),
     ],
@@ -135,3 +135,10 @@ def test_empty_lines_are_no_rows_but_not_any_number_of_them() -> None:
     spaced = table("anno_id", "ttc", end="\n\n")
     assert read_predictions(spaced, manifest=MANIFEST).ttc_s[0] == 1.5
     assert refusal(spaced + b"\n" * 200_000).code == "too-many-members"
+
+
+def test_the_line_of_a_faulty_row_counts_empty_lines() -> None:
+    data = b"\n\nanno_id,ttc\n\n0,1\n\n\n1,2,3\n"
+    with pytest.raises(Rejected) as rejected:
+        read_predictions(data, manifest=MANIFEST)
+    assert rejected.value.problems[0].where == "line 8"

@@ -5,7 +5,7 @@ import tracemalloc
 import pytest
 
 from evaluator import PROBLEM_CODES, Manifest, Problem, Rejected, read_predictions
-from evaluator.predictions.documents import parse
+from evaluator.predictions.documents import parse, too_large
 from evaluator.predictions.loading import read_sent
 from evaluator.predictions.writing import template
 from tests.evaluator.faulty_files import CASES, GOOD, MANIFEST
@@ -29,7 +29,8 @@ def test_a_faulty_file_is_rejected_in_these_words(name: str) -> None:
 
 def test_a_file_over_the_limit_is_not_looked_at() -> None:
     problem = rejection(b"\xff" * 101, max_bytes=100).problems[0]
-    assert problem == Problem("too-large", "The file has 101 bytes; expected at most 100 bytes.")
+    assert problem == Problem("too-large", too_large(n_bytes=101, max_bytes=100))
+    assert problem.message.startswith("The file is 101 bytes; expected at most 100 bytes. gzip makes")
 
 
 def test_the_empty_template_is_one_problem_not_one_for_each_sequence() -> None:
