@@ -36,6 +36,7 @@ COMMANDS: Final = {
     "methods": "own:methods",
     "download": "own:download",
     "withdraw": "own:withdraw",
+    "move": "own:move",
     "publish": "access:publish",
     "quota": "access:quota",
     "board": "boards:board",

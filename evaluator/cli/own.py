@@ -174,6 +174,26 @@ def _confirm(words: str) -> None:
         raise Failure("Nothing was changed.", exit_code=Exit.USAGE, code="not-confirmed")
 
 
+@click.command(short_help="Move a submission to another method of your team.")
+@click.argument("submission_id", metavar="ID", callback=slug)
+@click.option("--method", callback=sendable, required=True, help="Name or id of another private method.")
+@site_options
+@json_option
+def move(*, submission_id: str, method: str, url: str, as_json: bool) -> None:
+    """Move submission ID to another method of your team. Both methods have to be private.
+
+    \b
+    Example:
+      tsttc move 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11 --method "Foo++"
+    """
+    with connect(url, with_token=True) as client:
+        moved = client.move(submission_id, method=method)
+    if as_json:
+        echo_json(moved.document)
+        return
+    click.echo(printable(f"The submission to {moved.split} is now one of {moved.method}."))
+
+
 @click.command(short_help="Get back a prediction file that your team submitted.")
 @click.argument("submission_id", metavar="ID", callback=slug)
 @output_option("it")

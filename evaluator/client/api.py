@@ -226,6 +226,11 @@ class Client:
         address = self._address("submissions", submission_id, "withdraw")
         return one(self._retry(lambda: self._http.post(address)), Submission)
 
+    def move(self, submission_id: str, *, method: str) -> Submission:
+        """Move a submission to another private method of your team, by name or id."""
+        address = self._address("submissions", submission_id, "move")
+        return one(self._retry(lambda: self._http.post(address, json={"method": method})), Submission)
+
     def method(self, method_id: str) -> Method:
         """Fetch a method as this account may see it."""
         return self._get(Method, "methods", method_id)

@@ -47,6 +47,7 @@ urlpatterns = [
         name="api-board",
     ),
     path("submissions/<uuid:submission_id>/withdraw", views.WithdrawView.as_view(), name="api-withdraw"),
+    path("submissions/<uuid:submission_id>/move", views.MoveView.as_view(), name="api-move"),
     path(
         "splits/<slug:split>/editions",
         cacheable(edition_views.EditionsView.as_view()),

@@ -1,11 +1,12 @@
 """Views of splits and of withdrawing, and the rows that several views look up."""
 
-from typing import cast
+from typing import Any, cast
 
 from django.http import Http404, HttpResponseBase, HttpResponseNotModified, JsonResponse
 from django.shortcuts import get_object_or_404
 from django.utils import timezone
 from drf_spectacular.utils import OpenApiParameter, extend_schema
+from rest_framework import serializers
 from rest_framework.permissions import AllowAny
 from rest_framework.request import Request
 from rest_framework.response import Response
@@ -13,6 +14,7 @@ from rest_framework.views import APIView
 
 from leaderboard.api.authentication import split_of
 from leaderboard.api.exceptions import edition_number
+from leaderboard.api.parsers import LimitedJSONParser
 from leaderboard.api.schema import errors
 from leaderboard.api.serializers import SplitSerializer
 from leaderboard.api.submission_serializers import SubmissionSerializer
@@ -25,7 +27,7 @@ from leaderboard.models import Edition, Split, Submission, User
 from leaderboard.models.submissions import SubmissionQuerySet
 from leaderboard.ops import downloads
 from leaderboard.storage import files
-from leaderboard.submissions import intake, outcomes
+from leaderboard.submissions import intake, moving, outcomes
 
 
 def visible(request: Request) -> SubmissionQuerySet:
@@ -66,6 +68,34 @@ class WithdrawView(APIView):
         now = timezone.now()
         intake.withdraw(submission=submission, actor=cast("User", request.user), now=now)
         (outcome,) = outcomes.for_submissions([submission], now=now)
+        return Response(SubmissionSerializer(outcome).data)
+
+
+class MoveSerializer(serializers.Serializer[Any]):
+    """Where a submission is moved."""
+
+    method = serializers.CharField(help_text="Name or id of another private method of your team.")
+
+
+class MoveView(APIView):
+    parser_classes = [LimitedJSONParser]
+
+    @extend_schema(
+        operation_id="move",
+        request=MoveSerializer,
+        responses={200: SubmissionSerializer, **errors(404, 409, 422)},
+    )
+    def post(self, request: Request, submission_id: str) -> Response:
+        """Move a submission to another method of your team, while both are private. No slot comes back."""
+        submission = get_object_or_404(visible(request), pk=submission_id)
+        asked = request.data.get("method") if isinstance(request.data, dict) else None
+        if not isinstance(asked, str) or not asked:
+            sentence = "The field 'method' is empty; expected the name or id of a method."
+            raise Refused("missing-field", sentence, field="method")
+        now = timezone.now()
+        user = cast("User", request.user)
+        moved = moving.move(submission=submission, method_name=asked, actor=user, now=now)
+        (outcome,) = outcomes.for_submissions([moved], now=now)
         return Response(SubmissionSerializer(outcome).data)
 
 

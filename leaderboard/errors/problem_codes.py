@@ -61,6 +61,8 @@ API_GROUPS: Final[dict[str, dict[str, str]]] = {
         "split-not-open": "The split is not open for submissions yet.",
         "not-admitted": "Only admitted teams may submit to the split, and the team is not one of them.",
         "split-closed": "The split is closed for submissions.",
+        "not-movable": "The submission cannot be moved: it is withdrawn, or a method is not private.",
+        "same-file": "The method has a submission of the same file already.",
     },
     "Comparing": {
         "bad-comparison": "The request names too few or too many methods to compare, or one of them twice.",
@@ -115,7 +117,7 @@ _CODES_BY_STATUS: Final[dict[int, str]] = {
     404: "not-found no-ground-truth not-on-the-board edition-unknown",
     405: "method-not-allowed",
     406: "not-acceptable",
-    409: "split-not-open split-closed not-scored withdrawn edition-refused",
+    409: "not-movable same-file split-not-open split-closed not-scored withdrawn edition-refused",
     413: "too-large",
     415: "unsupported-media-type",
     429: "throttled quota-exceeded",

@@ -80,6 +80,7 @@ urlpatterns = [
     ),
     path("submissions/<uuid:submission_id>/receipt.jwt", submission_views.receipt, name="receipt"),
     path("submissions/<uuid:submission_id>/withdraw/", submission_views.withdraw, name="withdraw"),
+    path("submissions/<uuid:submission_id>/move/", submission_views.move, name="submission_move"),
     path("methods/<uuid:method_id>/", method_views.method, name="method"),
     path("compare/", compare_views.compare, name="compare"),
     path("methods/<uuid:method_id>/edit/", method_views.edit, name="method_edit"),

@@ -11,7 +11,7 @@ from pytest_django.fixtures import Settings
 from pytest_django.live_server_helper import LiveServer
 
 from leaderboard.models import Split, User
-from leaderboard.web.docs.api_examples import DRAFT, EXAMPLES, METHOD, OTHER, SUBMISSION
+from leaderboard.web.docs.api_examples import DRAFT, EXAMPLES, METHOD, MISNAMED, OTHER, SUBMISSION
 from tests import builders, pages
 from tests.leaderboard.web.docs.test_api_examples import METHODS, open_draft
 from tests.services import REQUIRED
@@ -81,8 +81,8 @@ def world(
         data = builders.predictions(edition, factor=factor)
         submission = builders.submit(owner, data, method=name, split="val", visibility=seen_by)
         made.ids[example] = str(submission.method_id)
-        if example == METHOD:
-            made.ids[SUBMISSION] = str(submission.pk)
+        if example in {METHOD, DRAFT}:
+            made.ids[SUBMISSION if example == METHOD else MISNAMED] = str(submission.pk)
     builders.score_all()
     builders.infer_all()
     Client().get(f"/api/v1/compare?split=val&m={made.ids[METHOD]}&m={made.ids[OTHER]}")

@@ -104,6 +104,8 @@ LINES: dict[str, Line] = {
     "analysis": line(GET="in 404 404 404 404 in in"),
     # Without its tick nothing is withdrawn.
     "withdraw": line(GET=TEAM, POST="in 404 422 422 404 in in"),
+    # Without a method nothing is moved.
+    "submission_move": line(GET=TEAM, POST="in 404 422 422 404 in in"),
     "receipt": line(GET=TEAM),
     "receipt_keys": line(GET=OPEN),
     # Sent without a field, an edit changes nothing; showing a method needs to be said.
@@ -173,6 +175,8 @@ LINES: dict[str, Line] = {
     "api-compare": line(GET="404 404 404 404 404 403 401"),
     # Maintainers see it, and are told that it is not theirs.
     "api-withdraw": line(POST="401 404 200 200 422 403 401"),
+    # It takes JSON alone.
+    "api-move": line(POST="401 404 415 415 415 403 401"),
     # The owner's method is private.
     "api-methods": line(GET=API_SIGNED_IN),
     "api-method": line(

@@ -17,6 +17,7 @@ from django.conf import settings
 SITE: Final = "https://leaderboard.example.org"
 """The site of the recorded answers; a page shows its own instead."""
 SUBMISSION: Final = "0f8b1c2d-3e4f-4a5b-8c6d-7e8f9a0b1c2d"
+MISNAMED: Final = "3f2504e0-4f89-41d3-9a0c-0305e82c3301"
 METHOD: Final = "7c9e6679-7425-4de9-944b-e07fc1f90ae7"
 OTHER: Final = "550e8400-e29b-41d4-a716-446655440000"
 DRAFT: Final = "16fd2706-8baf-433b-82eb-8c7fada847da"
@@ -154,6 +155,12 @@ EXAMPLES: Final[Mapping[str, Example]] = {
         _own(f"submissions/{SUBMISSION}/receipt", ("edition", "99")),
         f"tsttc receipt {SUBMISSION}",
         f'client.receipt("{SUBMISSION}")',
+    ),
+    "move": Example(
+        _send("POST", f"submissions/{MISNAMED}/move", body={"method": "Draft net"}),
+        _send("POST", f"submissions/{MISNAMED}/move", body={"method": "Darft net"}),
+        f'tsttc move {MISNAMED} --method "Draft net"',
+        f'client.move("{MISNAMED}", method="Draft net")',
     ),
     "submission_file": Example(
         _own(f"submissions/{SUBMISSION}/file"),

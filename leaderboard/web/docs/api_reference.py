@@ -22,6 +22,7 @@ GROUPS: Final = {
         "submission_file": "Download a prediction file",
         "receipt": "Get the receipt of a score",
         "withdraw": "Withdraw a submission",
+        "move": "Move a submission to another method",
     },
     "Splits and boards": {
         "list_splits": "List the splits",

@@ -1,5 +1,6 @@
 """The forms of submissions; the domain function refuses wrong values."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -20,6 +21,7 @@ from leaderboard.quotas import admissions, usage
 from leaderboard.submissions import questions, search
 from leaderboard.submissions.intake import SubmissionRequest
 from leaderboard.submissions.questions import Question
+from leaderboard.web.forms import SiteForm
 from leaderboard.web.methods.method_forms import DetailsForm
 
 
@@ -148,6 +150,21 @@ class SubmissionForm(DetailsForm):
             details={field.name: fields[field.name] for field in (*self.described, *self.detailed)},
             note=fields["note"],
         )
+
+
+class MoveForm(SiteForm):
+    """The method to which a submission is moved."""
+
+    method = forms.CharField(
+        label="To the method",
+        help_text="The private methods of your team.",
+        error_messages={"required": "No method was chosen; expected one of your team’s private methods."},
+    )
+
+    def __init__(self, *args: Any, methods: Iterable[Method], **options: Any) -> None:
+        super().__init__(*args, **options)
+        choices = [("", "Choose a method"), *((str(method.pk), method.name) for method in methods)]
+        self.fields["method"].widget = forms.Select(choices=choices)
 
 
 def parse_uuid(text: str) -> UUID | None:

@@ -29,7 +29,7 @@ from leaderboard.models import Evaluation, Status, Submission, User, Visibility
 from leaderboard.quotas import usage
 from leaderboard.statistics import analyses
 from leaderboard.storage import manifests
-from leaderboard.submissions import intake, outcomes, receipts, search
+from leaderboard.submissions import intake, moving, outcomes, receipts, search
 from leaderboard.submissions.progress import Progress, progress_of
 from leaderboard.web.boards import edition_tables
 from leaderboard.web.charts import analysis_charts
@@ -38,7 +38,7 @@ from leaderboard.web.forms import ConfirmForm
 from leaderboard.web.lookups import split_or_404
 from leaderboard.web.methods import result_tables
 from leaderboard.web.submissions import outcome_tables
-from leaderboard.web.submissions.forms import SearchForm, SubmissionForm
+from leaderboard.web.submissions.forms import MoveForm, SearchForm, SubmissionForm
 from leaderboard.web.submissions.status_line import StateLine, state_line
 
 PER_PAGE = 50
@@ -150,6 +150,23 @@ def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     return render(request, "submissions/withdraw.html", {"form": form, **context}, status=status)
 
 
+@own_form
+def move(request: HttpRequest, submission_id: UUID) -> HttpResponse:
+    user = cast("User", request.user)
+    own = Submission.objects.of(user).select_related("method__team", "split")
+    row = get_object_or_404(own, pk=submission_id)
+    form = MoveForm.asked(request, methods=moving.targets(row))
+    if form.is_valid():
+        with form.refusals():
+            moved = moving.move(
+                submission=row, method_name=form.cleaned_data["method"], actor=user, now=timezone.now()
+            )
+            messages.success(request, f"The submission is now one of {moved.method.name}.")
+            return redirect("submission", row.pk)
+    status = 422 if form.errors else 200
+    return render(request, "submissions/move.html", {"form": form, "submission": row}, status=status)
+
+
 def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, Progress, StateLine]:
     evaluations = Evaluation.objects.select_related("edition__ground_truth").prefetch_related("scores")
     rows = (
@@ -185,6 +202,7 @@ def _outcome(request: HttpRequest, row: Submission, progress: Progress) -> dict[
         "rescored": rescored,
         "is_mine": is_mine,
         "can_be_withdrawn": is_mine and outcomes.can_be_withdrawn(row),
+        "can_be_moved": is_mine and moving.targets(row).exists(),
         "can_be_published": is_mine
         and row.withdrawn_at is None
         and row.method.visibility != Visibility.PUBLIC,

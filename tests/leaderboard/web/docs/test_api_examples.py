@@ -17,7 +17,7 @@ from evaluator.cli import main
 from leaderboard.editions import corrections
 from leaderboard.models import Edition, Split, User
 from leaderboard.web.docs import api_reference
-from leaderboard.web.docs.api_examples import DRAFT, EXAMPLES, METHOD, OTHER, SITE, SUBMISSION
+from leaderboard.web.docs.api_examples import DRAFT, EXAMPLES, METHOD, MISNAMED, OTHER, SITE, SUBMISSION
 from tests import api_examples as sent
 from tests import builders
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -41,8 +41,8 @@ def answers(
         data = builders.predictions(edition, factor=factor)
         made = builders.submit(owner, data, method=name, split="val", visibility=seen_by)
         known[str(made.method_id)] = example
-        if example == METHOD:
-            known[str(made.pk)] = SUBMISSION
+        if example in {METHOD, DRAFT}:
+            known[str(made.pk)] = SUBMISSION if example == METHOD else MISNAMED
     builders.score_all()
     builders.infer_all()
     # Comparing is asked for once, and answered when a worker has done it.
