@@ -4,6 +4,14 @@
     predictions = read_predictions("mine.json", manifest=truth.manifest)
     print(evaluate(predictions, truth))
 
+Files: `read_predictions`, `write_predictions`, `convert`, `read_truth`, `read_manifest`, `read_numbering`,
+`manifest_frame`, `predictions_from_frame`, with `Predictions`, `GroundTruth`, `Manifest` and `Table`.
+Scores: `evaluate`, which returns a `Report` of `RangeScore`s, `compare_predictions`, which returns
+`Difference`s, `confidence_intervals`, `get_protocol`, `Protocol`, `PROTOCOLS`, `SCORE_NAMES`, `TTC_RANGES`,
+`rounded`, `format_rounded`.
+Scale ratios: `scale_ratio_to_ttc`, `ttc_to_scale_ratio`, `convert_rate`, `fps_of_gap`.
+A leaderboard: `Client`, `ClientError`. Faults of a file: `Rejected`, `Problem`, `PROBLEM_CODES`.
+
 It needs no network, clock or global state.
 """
 
@@ -64,6 +72,10 @@ else:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         globals()[name] = value
         return value
+
+    def __dir__() -> list[str]:
+        # What is loaded late would be missing, and what this module imports would be offered.
+        return sorted(__all__)
 
     def _version() -> str:
         metadata = import_module("importlib.metadata")  # costs more time than the rest of --help

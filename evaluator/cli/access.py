@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 import click
@@ -226,12 +227,23 @@ def _asked(url: str) -> str:
     return text
 
 
+def _minute(moment: str | None) -> str:
+    """A time of the server in the words of its sentences: the minute in which it has passed."""
+    try:
+        at = datetime.fromisoformat(moment or "").astimezone(UTC)
+    except ValueError:
+        return moment or ""
+    if at.second or at.microsecond:
+        at = at.replace(second=0, microsecond=0) + timedelta(minutes=1)
+    return f"{at:%Y-%m-%d %H:%M} UTC"
+
+
 def _quota_in_words(rows: Sequence[Quota]) -> Iterator[str]:
     table = [[Cell(text, is_bold=True) for text in ("split", "left", "of", "next slot")]]
     for row in rows:
         limit = "any number" if row.limit is None else f"{row.limit:,}"
         left = NO_VALUE if row.left is None else f"{row.left:,}"
-        opens = "now" if row.is_open else row.next_slot_at or "closed"
+        opens = "now" if row.is_open else _minute(row.next_slot_at) or "closed"
         table.append([Cell(printable(text)) for text in (row.split, left, limit, opens)])
     yield from aligned(table, align="<>><")
     sentences = [f"{row.split}: {row.sentence}" for row in rows if row.sentence and not row.is_open]

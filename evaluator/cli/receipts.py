@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def receipt(*, submission_id: str, output: Path | None, url: str) -> None:
     """Get the signed receipt of submission ID: what it scored, in which edition, by which file, and when.
 
-    Publish it with your paper: anyone can check it offline.
+    Put it into the supplementary material of your paper: anyone can check it offline.
 
     \b
     Example:

@@ -73,11 +73,18 @@ class _Scored:
         return {**self.report.as_dict(), "warnings": [asdict(warning) for warning in self.warnings]}
 
 
+class _Group(click.Choice[str]):
+    """One of the groups; box_size, as in Python, is box-size."""
+
+    def normalize_choice(self, choice: str, ctx: click.Context | None) -> str:
+        return super().normalize_choice(choice, ctx).replace("_", "-")
+
+
 @click.command(short_help="Score prediction files against your ground truth.")
 @several_predictions
 @truth_option
 @protocol_option
-@click.option("--by", type=click.Choice(GROUPS), help="Scores of each group of sequences.")
+@click.option("--by", type=_Group(GROUPS), help="Scores of each group of sequences.")
 @click.option(
     "--intervals",
     "with_intervals",

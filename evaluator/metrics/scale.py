@@ -31,28 +31,45 @@ def fps_of_gap(frame_gap: ArrayLike) -> Floats:
     return FRAME_RATE_HZ / as_floats(frame_gap)
 
 
-def scale_ratio_to_ttc(scale_ratio: ArrayLike, *, fps_hz: ArrayLike) -> Floats:
+def _rate_of(fps_hz: ArrayLike | None, frame_gap: ArrayLike | None) -> Floats:
+    if fps_hz is not None and frame_gap is None:
+        return as_floats(fps_hz)
+    if frame_gap is not None and fps_hz is None:
+        return fps_of_gap(frame_gap)
+    given = "both" if fps_hz is not None else "neither"
+    raise TypeError(f"Expected fps_hz or frame_gap, the rate of the scale ratios; found {given}.")
+
+
+def scale_ratio_to_ttc(
+    scale_ratio: ArrayLike, *, fps_hz: ArrayLike | None = None, frame_gap: ArrayLike | None = None
+) -> Floats:
     """Convert α > 0 to τ = 1 / (f · (1/α − 1)) in seconds; α = 1 (constant size) gives +∞.
 
-    >>> float(scale_ratio_to_ttc(0.8, fps_hz=2))
-    2.0
+    The rate f is `fps_hz` in Hz, or that of `frame_gap`. Raises `TypeError` for both and for neither.
+
+    >>> float(scale_ratio_to_ttc(0.8, fps_hz=2)), float(scale_ratio_to_ttc(0.8, frame_gap=5))
+    (2.0, 2.0)
     >>> float(scale_ratio_to_ttc(1.0, fps_hz=2))
     inf
     """
-    alpha = as_floats(scale_ratio)
+    alpha, rate = as_floats(scale_ratio), _rate_of(fps_hz, frame_gap)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        return np.asarray(1.0 / (as_floats(fps_hz) * (1.0 / alpha - 1.0)))
+        return np.asarray(1.0 / (rate * (1.0 / alpha - 1.0)))
 
 
-def ttc_to_scale_ratio(ttc_s: ArrayLike, *, fps_hz: ArrayLike) -> Floats:
+def ttc_to_scale_ratio(
+    ttc_s: ArrayLike, *, fps_hz: ArrayLike | None = None, frame_gap: ArrayLike | None = None
+) -> Floats:
     """Convert τ in seconds to α = 1 / (1 / (f · τ) + 1), the inverse of `scale_ratio_to_ttc`; ±∞ gives 1.
+
+    The rate f is `fps_hz` in Hz, or that of `frame_gap`. Raises `TypeError` for both and for neither.
 
     >>> float(ttc_to_scale_ratio(2.0, fps_hz=2))
     0.8
     """
-    tau = as_floats(ttc_s)
+    tau, rate = as_floats(ttc_s), _rate_of(fps_hz, frame_gap)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        return np.asarray(1.0 / (1.0 / (as_floats(fps_hz) * tau) + 1.0))
+        return np.asarray(1.0 / (1.0 / (rate * tau) + 1.0))
 
 
 def convert_rate(scale_ratio: ArrayLike, *, from_fps_hz: ArrayLike, to_fps_hz: ArrayLike) -> Floats:

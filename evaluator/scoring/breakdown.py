@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Final, Literal
+from typing import Final, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ CURVE_EDGES_S: Final = (
 )
 """Edges of the true time to contact in seconds, the ends of the paper's ranges among them."""
 
-GroupName = Literal["recording", "camera", "range", "occlusion", "lane", "box-size"]
+GroupName = Literal["recording", "camera", "range", "occlusion", "lane", "box-size", "box_size"]
 
 NOT_STATED: Final = "not stated"
 
@@ -110,10 +110,20 @@ def _intervals(
 # --- the groups ---------------------------------------------------------------------------------------------
 
 
+def group_name(by: str) -> GroupName:
+    """Return the name of a group in its first spelling. Raises `ValueError`, and `TypeError` for no text."""
+    expected = f"expected one of {', '.join(GROUPS)}"
+    if not isinstance(by, str):
+        raise TypeError(f"The group is of type {type(by).__name__}; {expected}.")
+    name = by.replace("_", "-")
+    if name not in GROUPS:
+        raise ValueError(f"Unknown group {by!r}; {expected}.")
+    return cast("GroupName", name)
+
+
 def groups_of(details: Details, *, by: str) -> dict[str, Rows]:
     """Return the rows of every non-empty group. Raises `ValueError` as `Report.breakdown` does."""
-    if by not in GROUPS:
-        raise ValueError(f"Unknown group {by!r}; expected one of {', '.join(GROUPS)}.")
+    by = group_name(by)
     return {name: rows for name, rows in GROUPS[by](details).items() if len(rows)}
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from evaluator.counting import counted
 from evaluator.metrics.protocol import OVERALL, metric_of, range_of, score_name
 from evaluator.metrics.scale import Floats
-from evaluator.scoring.breakdown import GroupName, groups_of, scores_of
+from evaluator.scoring.breakdown import GroupName, group_name, groups_of, scores_of
 from evaluator.scoring.results import Details, GroupScores, RangeScore, RecordingSums, format_rounded
 
 if TYPE_CHECKING:
@@ -86,11 +86,12 @@ class Report:
     def breakdown(
         self, by: GroupName, *, with_intervals: bool = False, unit: UnitKind | None = None
     ) -> list[GroupScores]:
-        """Score each group: `by` is recording, camera, range, occlusion, lane or box-size.
+        """Score each group: `by` is recording, camera, range, occlusion, lane or box-size (or box_size).
 
         `unit` is as in `confidence_intervals`. Raises `ValueError` for another `by`, or if the truth or
-        report lacks the data.
+        report lacks the data, and `TypeError` for what is no name of a group.
         """
+        by = group_name(by)
         details = self.require_details()
         return scores_of(
             details,
@@ -102,11 +103,14 @@ class Report:
             unit=unit,
         )
 
-    def by(self, group: GroupName, *, with_intervals: bool = False) -> pd.DataFrame:
+    def by(
+        self, group: GroupName, *, with_intervals: bool = False, unit: UnitKind | None = None
+    ) -> pd.DataFrame:
         """Return `breakdown` as a frame by group: `n_sequences`, `n_recordings`, scores. Needs pandas.
 
         With intervals, each score has two more columns, such as `mid_low` and `mid_high`.
         """
+        group = group_name(group)
         import pandas as pd  # noqa: PLC0415 -- of an extra
 
         rows = [
@@ -116,7 +120,7 @@ class Report:
                 "n_recordings": row.n_recordings,
                 **_with_ends(row, with_intervals=with_intervals),
             }
-            for row in self.breakdown(group, with_intervals=with_intervals)
+            for row in self.breakdown(group, with_intervals=with_intervals, unit=unit)
         ]
         return pd.DataFrame(rows).set_index(group)
 

@@ -29,6 +29,11 @@ class RangeScore:
         """The mean relative TTC error."""
         return self.means["rte"]
 
+    @property
+    def warning(self) -> float | None:
+        """The mean warning error; None if the protocol has none."""
+        return self.means.get("warning")
+
     def as_dict(self) -> dict[str, float | int | None]:
         """Return the score as plain data."""
         # Written out, because `dataclasses.asdict` takes longer than scoring.

@@ -67,10 +67,10 @@ class Command(RefusingCommand):
         if options["wait"]:
             self._follow(edition)
         self.stdout.write(line(corrections.progress(edition)))
-        self.stdout.write(
-            f"Compare and publish it at {settings.SITE_URL}"
-            f"{reverse('maintain_edition', args=[edition.split_id, edition.number])}"
-        )
+        # A demo has the port that its own command was given.
+        site = settings.SITE_URL if settings.PRODUCTION else "your demo, "
+        path = reverse("maintain_edition", args=[edition.split_id, edition.number])
+        self.stdout.write(f"Compare and publish it at {site}{path}")
 
     def _look(self, options: dict[str, Any]) -> None:
         if not options["dry_run"]:

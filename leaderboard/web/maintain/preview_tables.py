@@ -67,6 +67,7 @@ def effects(preview: Preview) -> tuple[str, ...]:
     before = [entry.old_status for entry in preview.entries]
     truth = _truth_effect(preview)
     unchanged += ["the ground truth"] * (not truth)
+    is_one = len(unchanged) == 1 and not unchanged[0].startswith("all ")
     scores = (
         f"{get_text_list(symbols, 'and')} change{'s' * (len(symbols) == 1)} for {_share(n, before)}."
         for n, symbols in by_count.items()
@@ -77,7 +78,7 @@ def effects(preview: Preview) -> tuple[str, ...]:
         *_state_effects(preview),
         *scores,
         f"{_share(n_moved, before)} get{'s' * (n_moved == 1)} another rank." if n_moved else "",
-        f"{get_text_list(unchanged, 'and')} stay{'s' * (len(unchanged) == 1)} the same." if unchanged else "",
+        f"{get_text_list(unchanged, 'and')} stay{'s' * is_one} the same." if unchanged else "",
     )
     return tuple(sentence[0].upper() + sentence[1:] for sentence in sentences if sentence)
 

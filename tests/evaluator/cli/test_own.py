@@ -134,3 +134,11 @@ def test_a_withdrawn_submission_says_so(tsttc: Tsttc, site: RecordedSite) -> Non
     site.put(f"GET /api/v1/submissions/{ID}", Reply(gone))
     assert "SCORED, withdrawn" in tsttc("submissions").stdout
     assert tsttc("status", ID).stdout.startswith("SCORED, withdrawn: Foo++ on val\n")
+
+
+def test_next_slot_is_written_as_in_the_sentence_below_the_table(tsttc: Tsttc, site: RecordedSite) -> None:
+    moments = ("2026-11-29T08:23:22.277839Z", "2026-11-29T08:24:00Z", "2026-11-29T09:23:22+01:00")
+    rows = [{"split": "val", "limit": 3, "left": 0, "next_slot_at": at, "is_open": False} for at in moments]
+    site.put("GET /api/v1/quota", Reply(rows))
+    lines = tsttc("quota").stdout.splitlines()[1:4]
+    assert [line.split(maxsplit=3)[3] for line in lines] == ["2026-11-29 08:24 UTC"] * 3

@@ -51,3 +51,12 @@ def test_the_ratio_inside_mid_is_the_ten_hertz_ratio_up_to_its_epsilon(ttc_s: fl
     with_epsilon = float(scale_ratio_10hz(ttc_s))
     assert with_epsilon == 1 / ((1 / (ttc_s * 10) + 1) + 1e-6)
     assert with_epsilon == pytest.approx(float(ttc_to_scale_ratio(ttc_s, fps_hz=10)), rel=3e-6)
+
+
+def test_the_frame_gap_stands_for_its_rate_and_one_of_both_is_needed() -> None:
+    for convert in (scale_ratio_to_ttc, ttc_to_scale_ratio):
+        assert convert(0.8, frame_gap=2) == convert(0.8, fps_hz=5)
+        with pytest.raises(TypeError, match="found neither"):
+            convert(0.8)
+        with pytest.raises(TypeError, match="found both"):
+            convert(0.8, fps_hz=5, frame_gap=2)

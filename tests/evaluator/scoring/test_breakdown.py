@@ -1,5 +1,7 @@
 """Scores of groups: they add up to the whole, and say where the errors are."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -92,6 +94,32 @@ def test_a_report_without_sequences_says_how_to_get_them(
 def test_an_unknown_group_names_those_that_exist(report: Report) -> None:
     with pytest.raises(ValueError, match="Unknown group 'weather'; expected one of recording, camera, range"):
         report.breakdown("weather")
+
+
+def test_groups_are_texts_in_either_spelling(report: Report) -> None:
+    pytest.importorskip("pandas")
+    assert report.by("box_size").equals(report.by("box-size"))
+    assert report.by("box_size").index.name == "box-size"
+    other: Any = np.arange(N)
+    with pytest.raises(TypeError, match=r"The group is of type ndarray; expected one of recording, camera"):
+        report.by(other)
+
+
+def test_frames_of_groups_take_the_unit_of_their_intervals(report: Report) -> None:
+    pytest.importorskip("pandas")
+    frame = report.by("camera", with_intervals=True, unit="recording")
+    rows = report.breakdown("camera", with_intervals=True, unit="recording")
+    assert [tuple(ends) for ends in frame[["mid_low", "mid_high"]].to_numpy()] == [
+        row.intervals["mid"] for row in rows
+    ]
+    with pytest.raises(ValueError, match="day"):
+        report.by("camera", with_intervals=True, unit="day")
+
+
+def test_a_range_has_the_warning_error_of_its_protocol(truth: GroundTruth, predictions: Predictions) -> None:
+    scored = evaluate(predictions, truth, protocol="tsttc-2").scores["overall"]
+    assert scored.warning == scored.means["warning"] is not None
+    assert evaluate(predictions, truth, protocol="tsttc-1").scores["overall"].warning is None
 
 
 def test_frames_for_pandas_have_a_row_for_each_group_and_each_sequence(report: Report) -> None:
