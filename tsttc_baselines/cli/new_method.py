@@ -26,6 +26,7 @@ FILES: Final = {
     "train.py.txt": "my_method/train.py",
     "method.py.txt": "my_method/method.py",
     "test_method.py.txt": "tests/test_method.py",
+    "predict.sh.txt": "predict.sh",
     "workflow.yml.txt": ".github/workflows/tsttc.yml",
 }
 """The files of the package, each with its template; both have "my-method" and "my_method" for the name."""
@@ -51,7 +52,10 @@ def new_method(*, name: str, as_json: bool) -> None:
             file = folder / path.replace("my_method", package)
             file.parent.mkdir(parents=True, exist_ok=True)
             text = (TEMPLATES / template).read_text(encoding="utf-8")
-            file.write_text(text.replace("my_method", package).replace("my-method", name), encoding="utf-8")
+            text = text.replace("my_method", package).replace("my-method", name)
+            file.write_text(text, encoding="utf-8", newline="\n")
+            if file.suffix == ".sh":
+                file.chmod(0o755)
     except OSError as error:
         message = f"{error.filename or folder} cannot be written: {error.strerror}."
         raise click.BadParameter(message, param_hint="NAME") from None

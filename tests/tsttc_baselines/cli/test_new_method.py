@@ -25,7 +25,7 @@ def written(name: str) -> Result:
 
 def test_every_template_is_written_with_the_name(here: Path) -> None:
     result = written("far-net")
-    assert result.stdout == "far-net: 10 files; far-net/README.md says how to train, run and score it.\n"
+    assert result.stdout == "far-net: 11 files; far-net/README.md says how to train, run and score it.\n"
     assert set(FILES) == {path.name for path in TEMPLATES.iterdir()}
     texts = {path: path.read_text() for path in (here / "far-net").rglob("*") if path.is_file()}
     assert len(texts) == len(FILES)
