@@ -142,7 +142,7 @@ def sign(document: Mapping[str, Any], *, private_key: bytes) -> str:
 
 
 def claimed_site(receipt: bytes | str) -> str:
-    """Return the site that a receipt names, unchecked, or an empty text: whoever wrote it can name any."""
+    """Return the site that a receipt names, unchecked, or an empty text. Its author can name any site."""
     import jwt  # noqa: PLC0415 - slow to import
 
     try:

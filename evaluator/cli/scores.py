@@ -76,7 +76,7 @@ class _Scored:
 class _Group(click.Choice[str]):
     """One of the groups; box_size, as in Python, is box-size."""
 
-    def normalize_choice(self, choice: str, ctx: click.Context | None) -> str:
+    def normalize_choice(self, choice: object, ctx: click.Context | None) -> str:
         return super().normalize_choice(choice, ctx).replace("_", "-")
 
 
