@@ -43,6 +43,28 @@ def test_a_name_that_cannot_be_taken_is_refused(here: Path, name: str) -> None:
     assert [path.name for path in here.iterdir()] == ["there"]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="the jobs run on Linux")
+def test_predict_in_an_empty_checkout_names_what_the_job_has_to_fetch(here: Path) -> None:
+    assert written("far-net").exit_code == 0
+
+    def predict(**environment: str) -> str:
+        done = subprocess.run(
+            ["./predict.sh", "predictions.json"],
+            cwd=here / "far-net",
+            env={"PATH": os.environ["PATH"], **environment},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode != 0
+        return done.stderr
+
+    assert "TSTTC_SOURCE" in predict()
+    assert "frames/val is not there" in predict(TSTTC_SOURCE="https://leaderboard.invalid/x.whl")
+    present = {"TSTTC_SOURCE": "https://leaderboard.invalid/x.whl", "FRAMES": str(here)}
+    assert "weights.pt is not there" in predict(**present)
+
+
 @pytest.mark.torch
 @pytest.mark.slow
 def test_the_package_passes_its_own_test(here: Path) -> None:
