@@ -255,9 +255,23 @@ def _explained(client: Client, data: bytes, fault: Rejected, *, split: str, curr
             except Rejected:
                 continue
             return former.explained(fault, split=split, edition=number, keys=keys)
+        for other in [name for name in client.splits() if name != split][: former.MAX_MANIFESTS]:
+            if _fits(client, data, split=other):
+                return former.of_another_split(fault, split=split, other=other)
     except (ClientError, Rejected):
         return fault  # the problem is known without the editions
     return fault
+
+
+def _fits(client: Client, data: bytes, *, split: str) -> bool:
+    from evaluator import read_manifest, read_predictions  # noqa: PLC0415 -- loads numpy
+    from evaluator.client.answers import Refused  # noqa: PLC0415 -- loads msgspec
+
+    try:
+        read_predictions(data, manifest=read_manifest(client.manifest(split)))
+    except (Refused, Rejected):  # a split without ground truth has no manifest
+        return False
+    return True
 
 
 def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submission:

@@ -22,6 +22,17 @@ def is_of_keys(rejected: Rejected) -> bool:
     return all(problem.code in _CODES for problem in rejected.problems)
 
 
+def of_another_split(rejected: Rejected, *, split: str, other: str) -> Rejected:
+    """Add to the first problem that the file fits the manifest of another split."""
+    first, *rest = rejected.problems
+    sentence = (
+        f'The file fits the split "{other}", and was sent to "{split}". Send it to "{other}", or make a file '
+        f'for the manifest of "{split}".'
+    )
+    problem: Problem = replace(first, message=f"{first.message} {sentence}")
+    return Rejected([problem, *rest], n_problems=rejected.n_problems)
+
+
 def explained(rejected: Rejected, *, split: str, edition: int, keys: KeyKind) -> Rejected:
     """Add to the first problem that the file fits the manifest of this edition, with the command for it."""
     sentence = advice(split=split, edition=edition, keys=keys)

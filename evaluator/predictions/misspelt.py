@@ -13,8 +13,13 @@ from evaluator.truth.ground_truth import Manifest
 MAX_EXAMINED: Final = 1_000
 """At most so many unknown keys are compared with the manifest."""
 
+SPREADSHEET: Final = (
+    "The times ts are rounded, as spreadsheets write long numbers, so their last digits are lost. Write the "
+    "table again, and do not save it with a spreadsheet."
+)
 _SEPARATOR: Final = re.compile(r"[\\/,;:|]+")
 _AROUND: Final = " \t\r\n\"'()[]"
+_ROUNDED: Final = re.compile(r"[0-9](?:\.[0-9]{1,16})?[eE]\+[0-9]{1,3}")
 _DIGITS: Final = re.compile(r"[0-9]+")
 _PREFIX: Final = re.compile(r"[A-Za-z]+[_ -]?(?=[0-9]+\Z)")
 _MAX_CHARS: Final = 200
@@ -27,7 +32,8 @@ def advice(unknown: Sequence[str], manifest: Manifest) -> str:
     examined = unknown[:MAX_EXAMINED]
     meant = _natural_keys_meant(examined, manifest) or _anno_ids_meant(examined, manifest)
     if 2 * len(meant) <= len(examined):
-        return ""
+        n_rounded = sum(any(map(_ROUNDED.fullmatch, _parts(name))) for name in examined if is_natural(name))
+        return SPREADSHEET if 2 * n_rounded > len(examined) else ""
     given, expected = next(iter(meant.items()))
     faults = dict.fromkeys(fault for pair in meant.items() for fault in _faults(*pair))
     reasons = f": {'; '.join(faults)}" if faults else ""

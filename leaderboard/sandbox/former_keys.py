@@ -8,7 +8,7 @@ from django.conf import settings
 from evaluator import Predictions, Problem, Rejected
 from evaluator.predictions import former
 from evaluator.predictions.former import MAX_MANIFESTS
-from leaderboard.models import Edition, SentFile
+from leaderboard.models import Edition, SentFile, Split
 from leaderboard.sandbox import child
 from leaderboard.storage import files, manifests
 
@@ -37,7 +37,17 @@ def explained(
         if predictions is not None:
             number = max(number for number, each in published if each == digest)
             return former.explained(worded, split=edition.split_id, edition=number, keys=predictions.keys)
+    for name, digest in _other_splits(file, edition) if former.is_of_keys(rejected) else ():
+        if _read(file, digest=digest, heartbeat=heartbeat) is not None:
+            return former.of_another_split(worded, split=edition.split_id, other=name)
     return worded
+
+
+def _other_splits(file: SentFile, edition: Edition) -> list[tuple[str, str]]:
+    """Return the names of other splits on the site's pages, with the digests of their manifests."""
+    rows = Split.objects.shown().exclude(pk=edition.split_id).exclude(current_edition=None)
+    pairs = rows.values_list("pk", "current_edition__ground_truth__manifest_digest")
+    return [(name, digest) for name, digest in pairs if digest != file.manifest_digest][:MAX_MANIFESTS]
 
 
 def _read(file: SentFile, *, digest: str, heartbeat: Callable[[], bool]) -> Predictions | None:

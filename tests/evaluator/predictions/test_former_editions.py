@@ -107,3 +107,21 @@ def test_submit_says_which_edition_a_file_fits_in_the_words_of_the_server(
     assert refused.exit_code == 1
     assert former.advice(split="val", edition=1, keys="anno_id") in refused.stderr
     assert site.posts == []
+
+
+def test_submit_says_which_other_split_a_file_fits(
+    tsttc: Tsttc, site: RecordedSite, at_site: None, tmp_path: Path
+) -> None:
+    def csv(truth: GroundTruth) -> Reply:
+        return Reply(truth.manifest.to_csv(), headers={"Content-Type": "text/csv"})
+
+    site.put("GET /api/v1/splits", Reply([{"split": name} for name in ("val", "empty", "test")]))
+    site.put("GET /api/v1/splits/val/editions", Reply([{"edition": 1, "manifest": SECOND.manifest.digest}]))
+    site.put("GET /api/v1/splits/val/manifest", csv(SECOND))
+    site.put("GET /api/v1/splits/test/manifest", csv(FIRST))
+    mine = tmp_path / "mine.json"
+    mine.write_bytes(BY_NUMBER)
+    refused = tsttc("submit", mine, "--split", "val", "--method", "Foo++")
+    assert refused.exit_code == 1
+    assert 'The file fits the split "test", and was sent to "val".' in refused.stderr
+    assert site.posts == []

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 import pytest
 
 from evaluator import Manifest, Problem, Rejected, read_predictions
+from evaluator.predictions.misspelt import SPREADSHEET
 from evaluator.problems import plain_pointer
 from tests.evaluator.worlds import make_truth
 
@@ -73,6 +74,12 @@ def test_misspelt_anno_ids_show_the_spelling_of_the_manifest(change: str) -> Non
 @pytest.mark.parametrize("keys", [[f"9999/1/{n}/7" for n in range(20)], [f"frame-{n}-x" for n in range(20)]])
 def test_keys_that_are_not_almost_right_get_no_advice(keys: list[str]) -> None:
     assert "Probably" not in problems_of(keys)["unknown-keys"].message
+
+
+@pytest.mark.parametrize("rounded", ["1.67765E+18", "2e+09", "1.7E+12"])
+def test_times_that_a_spreadsheet_has_rounded_are_named(rounded: str) -> None:
+    keys = [part(2, lambda _: rounded)(key) + f"{number}" for number, key in enumerate(KEYS)]
+    assert SPREADSHEET in problems_of(keys)["unknown-keys"].message
 
 
 def test_two_keys_that_differ_by_zeros_alone_are_not_guessed() -> None:

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from evaluator.predictions import former
-from leaderboard.models import Edition, Status, User
+from leaderboard.models import Edition, Split, Status, User
+from leaderboard.models.benchmark import Listing
 from leaderboard.storage import truth_values
 from tests import builders
 from tests.editions import corrected, extended, open_edition, publish, roll_back
@@ -92,3 +93,15 @@ def test_a_file_that_lacks_the_sequences_of_a_new_edition_gets_it_too(
     numbered = by_anno_id(edition)
     publish(open_edition(extended(tmp_path)), leave_out=True)
     assert former.advice(split="test", edition=1, keys="anno_id") in problem_of(owner, numbered)
+
+
+def test_a_file_of_another_split_is_named_as_such(edition: Edition, owner: User, tmp_path: Path) -> None:
+    val = builders.import_truth(tmp_path, split="val", seed=3)
+    off = builders.import_truth(tmp_path, split="demo", seed=4)
+    sentence = 'The file fits the split "val", and was sent to "test".'
+    assert sentence in problem_of(owner, builders.predictions(val))
+    assert sentence in problem_of(owner, csv(by_natural_key(val)))
+    some = dict(list(by_natural_key(val).items())[1:])
+    assert "fits" not in problem_of(owner, some)
+    Split.objects.filter(pk="demo").update(listing=Listing.OFF)
+    assert "fits" not in problem_of(owner, builders.predictions(off))
