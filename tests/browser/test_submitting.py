@@ -325,3 +325,32 @@ def test_everything_works_without_script(new_page: NewPage, site: Site, truth: e
     expect(page.locator("th[aria-sort=ascending]")).to_contain_text("RTE")
     page.get_by_role("button", name="Sign out").click()
     expect(page.get_by_role("link", name="Sign in")).to_be_visible()
+
+
+def test_a_question_keeps_the_chosen_file_and_sends_it_once_it_is_confirmed(
+    browser: Browser, site: Site, truth: evaluator.GroundTruth
+) -> None:
+    # A context of its own, as above.
+    with browser.new_context(base_url=site.url) as context:
+        answer_the_question(context.new_page(), truth)
+
+
+def answer_the_question(page: Page, truth: evaluator.GroundTruth) -> None:
+    sign_up(page, email="slips@example.org", name="Slips")
+    submit(page, predictions(truth, factor=1.31), method="TTC-Former")
+    page.wait_for_url("**/submissions/*/")
+    page.goto("/submit/")
+    page.locator("input[name=split][value=test]").check()
+    page.get_by_label("Method", exact=True).fill("TTC-Fromer")
+    data = predictions(truth, factor=1.32)
+    page.get_by_label("Prediction file").set_input_files(
+        {"name": "p.json", "mimeType": "application/json", "buffer": data}
+    )
+    page.get_by_role("button", name="Submit").click()
+    expect(page.locator(".question")).to_contain_text("your team has “TTC-Former”")
+    confirmed = page.get_by_label("Submit the file all the same.")
+    expect(confirmed).to_be_focused()
+    confirmed.check()
+    page.get_by_role("button", name="Submit").click()
+    page.wait_for_url("**/submissions/*/")
+    expect(page.locator("h1")).to_contain_text("TTC-Fromer")
