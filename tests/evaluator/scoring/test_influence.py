@@ -76,7 +76,7 @@ def test_what_is_not_significant_has_a_sign_alone() -> None:
 
 def test_two_files_are_compared_with_what_their_difference_rests_on() -> None:
     truth = world(3)
-    near, far = (predictions(truth, 1, noise=noise) for noise in (0.2, 0.3))
+    near, far = predictions(truth, 1, noise=0.2), predictions(truth, 2, noise=0.3)
     differences = compare_predictions(near, far, truth)
     (known,) = (gap.influence for name, gap in differences.items() if name == "mid")
     assert known is not None

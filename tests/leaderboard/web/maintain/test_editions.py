@@ -56,7 +56,7 @@ def test_every_page_is_sound(keeper: Client, rescored: Edition, address: str) ->
 
 def test_desk_shows_each_split_with_its_board_and_what_is_prepared(keeper: Client, second: Edition) -> None:
     root = get(keeper, HUB)
-    assert [h2.text for h2 in root.all("h2")] == ["Waiting for you", "Pages", "Editions"]
+    assert [h2.text for h2 in root.all("h2")] == ["Waiting for you", "Pages", "State of the site", "Editions"]
     # Django's administration shows nothing to a maintainer who is no superuser.
     assert "administration" in root.one("main").text
     User.objects.update(is_superuser=False)

@@ -63,7 +63,7 @@ def address(team: Team, *parts: str) -> str:
 
 def cells(root: pages.Element, label: str) -> list[list[str]]:
     """The rows of the table in the region of this name, without what is only spoken."""
-    [region] = [div for div in root.all("div", role="region") if div.attributes["aria-label"] == label]
+    [region] = [div for div in root.all("div", role="region") if div.attributes.get("aria-label") == label]
     return [[visible_text(cell) for cell in row.all("td")] for row in region.one("tbody").all("tr")]
 
 
