@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
+# Imported here: `np.ma` imports it at its first use, and the process that reads files can open nothing then.
+from numpy import ma
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -22,11 +25,11 @@ def as_floats(values: Any) -> Floats:
         values = values.detach().cpu().double()  # on the CPU first: not every device has float64
     elif isinstance(values, list | tuple) and values and hasattr(values[0], "detach"):
         values = [as_floats(value) for value in values]
-    array = np.ma.asanyarray(values) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+    array = ma.asanyarray(values) if isinstance(values, ma.MaskedArray) else np.asarray(values)
     if array.dtype.kind in "cmM":
         raise TypeError(f"The values are of type {array.dtype}; expected real numbers.")
-    if isinstance(array, np.ma.MaskedArray):
-        return np.asarray(np.ma.filled(array.astype(np.float64), np.nan))
+    if isinstance(array, ma.MaskedArray):
+        return np.asarray(ma.filled(array.astype(np.float64), np.nan))
     return np.asarray(array, dtype=np.float64)
 
 

@@ -55,9 +55,12 @@ def test_a_token_gives_the_file_within_its_limits_only(submission: Submission, o
     assert client_of(owner, split_name="test").get(address(submission)).getvalue() != b""
 
 
-def test_a_file_that_the_store_no_longer_has_does_not_exist(submission: Submission, owner: User) -> None:
+def test_a_file_that_the_store_has_lost_is_the_fault_of_the_store(
+    submission: Submission, owner: User
+) -> None:
     files.store().delete(files.predictions_name(submission.digest))
-    assert client_of(owner).get(address(submission)).status_code == 404
+    answer = client_of(owner).get(address(submission))
+    assert (answer.status_code, answer.json()["code"]) == (503, "store-unavailable")
 
 
 @pytest.mark.parametrize("scope", [Scope.READ, Scope.SUBMIT])

@@ -114,6 +114,13 @@ def test_good_file_comes_back_as_the_same_values(read: Read, manifest: Manifest,
         assert np.array_equal(read(source, digest=sha256_digest(data)).ttc_s, ttc_s)
 
 
+def test_a_good_file_is_read_without_late_imports(read: Read, manifest: Manifest) -> None:
+    data = write_predictions(manifest=manifest, ttc_s=np.linspace(1, 9, manifest.n_sequences), keys="anno_id")
+    for sent in (data, gzip.compress(data)):
+        with opened(sent) as source:
+            assert read(source, digest=sha256_digest(sent)).ttc_s[0] == 1
+
+
 def test_faulty_file_is_rejected_with_the_words_of_the_evaluator(read: Read, manifest: Manifest) -> None:
     with pytest.raises(Rejected) as here:
         read_predictions(FAULTY, manifest=manifest)
