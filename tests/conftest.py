@@ -35,7 +35,7 @@ os.environ.setdefault("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
 
 _NUMBERS = itertools.count()
 
-NEED_TORCH = {"test_torch.py", "test_lightning.py"}
+NEED_TORCH = {"test_torch.py", "test_lightning.py", "test_threads.py"}
 
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:

@@ -111,7 +111,10 @@ def delete_expired(*, now: datetime) -> None:
 def longest_window() -> timedelta:
     """Return the longest window of any split and team, a day at least."""
     rules = [*Split.objects.all(), *QuotaOverride.objects.all()]
-    return max(timedelta(days=1), *(span for row in rules for span in (row.quota_window, row.quota_min_gap)))
+    windows = [timedelta(days=1)]
+    for row in rules:
+        windows += [row.quota_window, row.quota_min_gap]
+    return max(windows)
 
 
 def _mailboxes(people: QuerySet[User]) -> set[str]:

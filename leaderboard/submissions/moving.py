@@ -1,4 +1,4 @@
-"""A submission under the wrong method is moved to the right one, by its team, while nobody else sees it."""
+"""A submission under the wrong method is moved to the right one, by its team, while no other team sees it."""
 
 from datetime import datetime
 

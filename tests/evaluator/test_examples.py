@@ -125,7 +125,7 @@ def test_page_names_commands_options_and_exit_codes_that_there_are() -> None:
         *(each for command in others.values() for each in parts_of(command)),
     ]
     known = {flag for command in commands for option in command.params for flag in option.opts}
-    of_curl = {"--fail-with-body", "--form-string", "--proto"}
-    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", PAGE)) - of_curl <= known
+    of_curl_and_gh = {"--fail-with-body", "--form-string", "--proto", "--pattern"}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", PAGE)) - of_curl_and_gh <= known
     codes = {int(code) for code in re.findall(r"[Cc]ode (\d)", PAGE)}
     assert codes <= {code.value for code in Exit}

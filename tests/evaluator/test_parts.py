@@ -64,6 +64,6 @@ def test_parts_of_several_processes_are_merged_and_may_overlap(
 
 def test_names_for_an_editor_are_those_that_there_are() -> None:
     assert set(get_args(ProtocolName)) == set(PROTOCOLS)
-    assert set(get_args(GroupName)) == set(GROUPS)
+    assert set(get_args(GroupName)) == {*GROUPS, *(name.replace("-", "_") for name in GROUPS)}
     assert set(get_args(UnitKind)) == set(KINDS)
     assert evaluator.__version__ == version("tsttc")

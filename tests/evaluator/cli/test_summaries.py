@@ -57,7 +57,7 @@ def test_failure_lists_its_problems(tsttc: Tsttc, site: RecordedSite, tmp_path: 
     assert submit(tsttc, bad, file="broken.json") == 1
     text = bad.read_text()
     assert text.startswith("### New on val: not submitted\n\n**")
-    assert "\n5. /23: The value is the string" in text
+    assert '\n5. "23": The value is the string' in text
     site.put(POST, Reply(problem("No slot is left.", code="quota-exceeded"), status=429))
     assert submit(tsttc, late) == 5
     assert "**No slot is left.**" in late.read_text()

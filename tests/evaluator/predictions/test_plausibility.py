@@ -117,7 +117,7 @@ def test_flipped_signs_are_seen_without_the_truth() -> None:
     assert "140 of 140 values rise; expected most of them to fall" in warning.message
 
 
-def test_submit_warns_before_it_sends_and_sends_all_the_same(
+def test_submit_warns_before_it_sends_and_sends_what_is_confirmed(
     tsttc: Tsttc, site: RecordedSite, at_site: None, driven: GroundTruth, tmp_path: Path
 ) -> None:
     site.put(
@@ -126,11 +126,12 @@ def test_submit_warns_before_it_sends_and_sends_all_the_same(
     )
     path = tmp_path / "mine.json"
     path.write_bytes(flat(RNG.permutation(driven.ttc_s).tolist()))
-    result = tsttc("submit", path, "--split", "val", "--method", "Foo++")
-    assert result.stderr.startswith(
-        "Warning: The predictions seem to be in another order than the sequences. "
-    )
-    assert len(site.posts) == 1
+    for confirmed, n_posts in (((), 0), (("--yes",), 1)):
+        result = tsttc("submit", path, "--split", "val", "--method", "Foo++", *confirmed)
+        assert result.stderr.startswith(
+            "Warning: The predictions seem to be in another order than the sequences. "
+        )
+        assert len(site.posts) == n_posts
 
 
 def test_every_code_is_described_in_the_docs() -> None:

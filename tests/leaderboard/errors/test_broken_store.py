@@ -118,7 +118,7 @@ def test_whatever_reads_from_a_broken_store_gets_503(
     for address in addresses:
         answer = api.get(address)
         assert answer.status_code == 200
-        answer.close()
+        assert b"".join(answer)
     with pytest.MonkeyPatch.context() as patch:
         if breaking is None:
             patch.setattr(filesystem, "open", _raise_stale, raising=False)

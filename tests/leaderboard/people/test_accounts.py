@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import pytest
+from django.test import RequestFactory
 from django.utils import timezone
 
 from leaderboard.api import exceptions
@@ -30,7 +31,7 @@ def test_a_request_that_began_before_the_account_was_closed_writes_nothing(
     User.objects.filter(pk=stranger.pk).update(is_active=False)
     with pytest.raises(Refused, match="This account is closed or deleted") as refused:
         VERBS[verb](edition, stranger, secret)
-    answer = exceptions.exception_handler(refused.value, {})
+    answer = exceptions.exception_handler(refused.value, {"request": RequestFactory().get("/api/v1/")})
     assert answer is not None
     assert (answer.status_code, answer.data["code"]) == (401, "account-closed")
     for model in (ApiToken, Membership):

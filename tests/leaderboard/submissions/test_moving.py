@@ -1,4 +1,4 @@
-"""A submission under the wrong method is moved by its team, while nobody else sees it."""
+"""A submission under the wrong method is moved by its team, while no other team sees it."""
 
 import json
 

@@ -163,6 +163,7 @@ def test_the_page_says_on_how_few_recordings_the_difference_rests(
     builders.infer_all()
     # Every recording favours this one, so no number leaves enough of them for a test.
     row = Comparison.objects.get()
+    assert row.differences
     assert row.differences["mid"]["influence"]["n_to_undecided"] is None
     row.differences["mid"]["influence"] |= {"n_to_undecided": 3, "n_to_turn": 5, "is_turn_significant": True}
     row.save()

@@ -198,7 +198,7 @@ def test_own_method_offers_the_next_submission_and_lists_the_rejected_ones(
 
 
 def test_a_score_without_an_error_has_a_bound_and_no_interval(
-    client: Client, owner: User, tmp_path: Path
+    client: Client, benchmark: None, owner: User, tmp_path: Path
 ) -> None:
     """[0, 0] would say that no error can occur."""
     edition = builders.import_truth(tmp_path, split="val", protocol="tsttc-2")
