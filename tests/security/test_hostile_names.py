@@ -71,7 +71,7 @@ def named(edition: Edition, owner: User, settings: Settings) -> Named:
         client, path = ((program, "/api/v1/submissions"), (browser, "/submit/"))[n % 2]
         response = send(client, path, {"split": b"test", **texts}, data, filename=raw(name))
         is_asked = response.status_code == 200 and path == "/submit/"
-        if is_asked or (response.status_code == 422 and "looks like" in response.content.decode()):
+        if is_asked or (response.status_code in {400, 422} and "looks like" in response.content.decode()):
             # Punctuation makes no name another one, and a page asks about names that are close; a word of
             # its own does.
             check_refusal(response)

@@ -103,6 +103,7 @@ def test_a_store_that_is_no_folder_gets_503(
     assert not Submission.objects.exists()
 
 
+@pytest.mark.django_db(transaction=True)
 @pytest.mark.parametrize("breaking", [_not_a_folder, _not_mounted, None])
 def test_whatever_reads_from_a_broken_store_gets_503(
     edition: Edition, owner: User, settings: Settings, breaking: Break | None, tmp_path: Path
