@@ -65,6 +65,11 @@ class Visitor:
         """Upload a file through the form; returns the submission's id."""
         fields = {"split": split, "method": method, **more}
         answer = self.post_form("/submit/", fields, file=("predictions.json", data))
+        question = re.search(r'<input type="checkbox" name="confirmed"[^>]* value="([^"]+)"', answer.text)
+        if question:
+            # The page asks about warnings and about names and bytes that it knows; this person means it.
+            fields["confirmed"] = html.unescape(question[1])
+            answer = self.post_form("/submit/", fields, file=("predictions.json", data))
         match = re.fullmatch(r"/submissions/([0-9a-f-]{36})/", answer.url.path)
         assert match, answer.text
         return match[1]

@@ -70,10 +70,12 @@ def named(edition: Edition, owner: User, settings: Settings) -> Named:
         texts = dict.fromkeys(("method", "description", "note"), raw(name))
         client, path = ((program, "/api/v1/submissions"), (browser, "/submit/"))[n % 2]
         response = send(client, path, {"split": b"test", **texts}, data, filename=raw(name))
-        is_asked = response.status_code == 200 and path == "/submit/"
-        if is_asked or (response.status_code in {400, 422} and "looks like" in response.content.decode()):
-            # Punctuation makes no name another one, and a page asks about names that are close; a word of
-            # its own does.
+        body = response.content.decode()
+        if response.status_code in {400, 422} and (
+            "looks like" in body or "Nothing is submitted yet" in body
+        ):
+            # Punctuation makes no name another one, a word of its own does. A page asks about names that are
+            # close and about the same bytes; a program is not asked.
             check_refusal(response)
             texts["method"] = raw(f"{name} {''.join('bdfghkmnpr'[int(digit)] for digit in str(n))}")
             response = send(
