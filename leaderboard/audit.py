@@ -6,11 +6,14 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from django.db import transaction
+import structlog
+from django.db import IntegrityError, transaction
 from django.db.models import Model, QuerySet
 
 from leaderboard.models import AuditEvent, AuditText, SweepBeat, User
 from leaderboard.models.audit import GENESIS, Unsealed
+
+log = structlog.get_logger(__name__)
 
 _CHUNK = 500
 # What stands in an event for a name that is in a table of its own.
@@ -92,30 +95,47 @@ def _storable(text: str) -> str:
 
 
 def seal() -> int:
-    """Seal every event that is committed and not sealed yet. Returns how many; 0 if another worker seals."""
+    """Seal every event that is committed and not sealed yet. Returns how many; 0 if another worker seals.
+
+    An event that the database refuses to seal keeps no other one waiting; the next call tries it again.
+    """
     SweepBeat.objects.get_or_create(pk=SweepBeat.THE_ONE)
-    n_sealed = 0
-    while n_now := _seal_some():
+    n_sealed, after = 0, None
+    while (done := _seal_some(after=after)) is not None:
+        n_now, after = done
         n_sealed += n_now
     return n_sealed
 
 
-def _seal_some() -> int:
+def _seal_some(*, after: int | None) -> tuple[int, int] | None:
+    """Seal a few events behind that id. Returns how many and the id of the last; None without any."""
     with transaction.atomic():
         # Whoever has this row is the only one who seals. SQLite has one writer at a time.
         if not SweepBeat.objects.select_for_update(skip_locked=True, no_key=True):
-            return 0
-        last = AuditEvent.objects.exclude(hash=None).order_by("-seal_number").first()
-        number, tip = (last.seal_number or 0, last.hash or "") if last else (0, GENESIS)
-        events = list(AuditEvent.objects.filter(hash=None).order_by("pk")[:_CHUNK])
+            return None
+        waiting = AuditEvent.objects.filter(hash=None).order_by("pk")
+        events = list(waiting.filter(pk__gt=after)[:_CHUNK] if after is not None else waiting[:_CHUNK])
+        number, tip = _end_of_chain()
+        n_sealed = 0
         for event in events:
-            number += 1
-            seal = {"seal_number": number, "previous_hash": tip, "hash": event.hash_after(tip)}
-            # Not by the model's own queryset, which refuses every change. One after the other: the database
-            # compares each seal with the one before.
-            QuerySet[AuditEvent](AuditEvent).filter(pk=event.pk).update(**seal)
-            tip = str(seal["hash"])
-    return len(events)
+            seal = {"seal_number": number + 1, "previous_hash": tip, "hash": event.hash_after(tip)}
+            try:
+                with transaction.atomic():
+                    # Not by the model's own queryset, which refuses every change. One after the other: the
+                    # database compares each seal with the one before.
+                    QuerySet[AuditEvent](AuditEvent).filter(pk=event.pk).update(**seal)
+            except IntegrityError:
+                # Its hash is taken, or somebody else has sealed: an intruder with the application's rights.
+                log.exception("audit_event_not_sealed", event_id=event.pk)
+                number, tip = _end_of_chain()
+                continue
+            number, tip, n_sealed = number + 1, str(seal["hash"]), n_sealed + 1
+    return (n_sealed, events[-1].pk) if events else None
+
+
+def _end_of_chain() -> tuple[int, str]:
+    last = AuditEvent.objects.exclude(hash=None).order_by("-seal_number").first()
+    return (last.seal_number or 0, last.hash or "") if last else (0, GENESIS)
 
 
 # --- reading it ------------------------------------------------------------------------------------------

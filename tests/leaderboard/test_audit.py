@@ -2,6 +2,8 @@
 
 import random
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
 from datetime import timedelta
 from io import StringIO
 from typing import Any
@@ -9,6 +11,7 @@ from typing import Any
 import pytest
 from django.core.management import CommandError, call_command
 from django.db import IntegrityError, connection, transaction
+from django.db.migrations.executor import MigrationExecutor
 from django.utils import timezone
 
 from leaderboard import audit
@@ -307,6 +310,117 @@ def test_an_end_that_was_cut_off_is_missed_by_who_noted_the_last_hash(db: None) 
     assert verify_audit().startswith("audit: 2 events, unbroken")
     with pytest.raises(CommandError, match=f"no event has the hash {noted}"):
         verify_audit("--expect", noted)
+
+
+# --- damage from before the database guarded the log --------------------------------------------------------
+
+
+@contextmanager
+def unguarded() -> Iterator[None]:
+    """Write as an intruder could before: PostgreSQL lets everything pass."""
+    guards = ("audit_new_event", "audit_seal_only") if connection.vendor == "postgresql" else ()
+    for guard in guards:
+        in_sql(f"ALTER TABLE leaderboard_auditevent DISABLE TRIGGER {guard}")
+    yield
+    for guard in guards:
+        in_sql(f"ALTER TABLE leaderboard_auditevent ENABLE TRIGGER {guard}")
+
+
+def migrate_again() -> str:
+    """Run the migration that mends the log once more. Returns what it says."""
+    executor = MigrationExecutor(connection)
+    graph = executor.loader.graph
+    [migration] = [key for key in graph.nodes if key[1].endswith("_a_chain_that_goes_on")]
+    executor.migrate([(parent[0], parent[1]) for parent in sorted(graph.node_map[migration].parents)])
+    executor = MigrationExecutor(connection)
+    with redirect_stdout(StringIO()) as said:
+        executor.migrate(executor.loader.graph.leaf_nodes())
+    return said.getvalue()
+
+
+LARGEST = 2**63 - 1
+
+
+def forge(event: AuditEvent, *, seal_number: int | None, previous_hash: str | None, hash: str | None) -> None:  # noqa: A002
+    with unguarded():
+        in_sql(
+            "UPDATE leaderboard_auditevent SET seal_number = %s, previous_hash = %s, hash = %s WHERE id = %s",
+            seal_number,
+            previous_hash,
+            hash,
+            event.pk,
+        )
+
+
+@pytest.mark.django_db(transaction=True)
+@pytest.mark.parametrize(
+    ("previous_hash", "hash_"),
+    [
+        ("the last", "b" * 64),
+        ("b" * 64, "c" * 64),
+        ("the last", GENESIS),
+        ("b" * 64, "b" * 64),
+        ("b" * 64, "none"),
+    ],
+)
+def test_after_an_event_with_the_largest_number_sealing_goes_on_and_it_is_named(
+    previous_hash: str, hash_: str
+) -> None:
+    tip = str(sealed(3).hash)
+    forged = record()
+    before = tip if previous_hash == "the last" else previous_hash
+    forge(forged, seal_number=LARGEST, previous_hash=before, hash=hash_)
+    said = migrate_again()
+    assert f"The audit event {forged.pk} had the seal number {LARGEST}, and has 4 now." in said
+    for _ in range(2):
+        record(2)
+        pollers.sweep(rng=random.Random(0))
+    verification = audit.verify()
+    assert (verification.n_events, verification.unsealed.n_events) == (8, 0)
+    assert {each.event_id for each in verification.breaks} == {forged.pk}
+    assert migrate_again() == ""
+
+
+@pytest.mark.django_db(transaction=True)
+def test_two_events_with_numbers_at_the_end_and_parts_of_seals_keep_no_event_from_being_sealed() -> None:
+    tip = str(sealed(2).hash)
+    first, second, no_hash, no_number, sound = (record() for _ in range(5))
+    forge(first, seal_number=LARGEST - 1, previous_hash=tip, hash="d" * 64)
+    forge(second, seal_number=LARGEST, previous_hash="e" * 64, hash=GENESIS)
+    forge(no_hash, seal_number=LARGEST - 2, previous_hash="b", hash=None)
+    forge(no_number, seal_number=None, previous_hash=None, hash="f" * 64)
+    said = migrate_again()
+    for event in (first, second, no_hash, no_number):
+        assert f"The audit event {event.pk} had" in said
+    assert f"The audit event {sound.pk} " not in said
+    assert audit.seal() == 3
+    verification = audit.verify()
+    assert (verification.n_events, verification.unsealed.n_events) == (7, 0)
+    assert {each.event_id for each in verification.breaks} == {first.pk, second.pk}
+
+
+@pytest.mark.django_db(transaction=True)
+@pytest.mark.parametrize(
+    "details",
+    [
+        pytest.param('{"n": 1' + "0" * 5000 + "}", id="digits"),
+        pytest.param('{"n": ' + "[" * 3000 + "]" * 3000 + "}", id="depth", marks=POSTGRESQL_ONLY),
+        pytest.param("[]", id="list"),
+        pytest.param("null", id="null"),
+        pytest.param('"' + "x" * 1_000_001 + '"', id="text"),
+    ],
+)
+def test_details_that_cannot_be_read_are_replaced_by_their_hash(details: str, maintainer: User) -> None:
+    sealed()
+    event = record()
+    with unguarded():
+        in_sql("UPDATE leaderboard_auditevent SET details = %s WHERE id = %s", details, event.pk)
+    record()
+    assert f"The audit event {event.pk} had details that cannot be read" in migrate_again()
+    assert audit.seal() == 2
+    event.refresh_from_db()
+    assert set(event.details) == {"unreadable"}
+    assert audit.verify().breaks == ()
 
 
 # --- looking for events ----------------------------------------------------------------------------------

@@ -11,7 +11,9 @@ from django.db import connection, transaction
 from psycopg import sql
 
 ONLY: Final = {
-    "leaderboard_auditevent": "SELECT, INSERT, UPDATE (seal_number, previous_hash, hash)",
+    # Without the id: one that the sequence has yet to give would keep another event from being written.
+    "leaderboard_auditevent": "SELECT, INSERT (at, actor_id, verb, noun, noun_id, details, seal_number, "
+    "previous_hash, hash), UPDATE (seal_number, previous_hash, hash)",
     "django_migrations": "SELECT",
 }
 _ROLE: Final = (

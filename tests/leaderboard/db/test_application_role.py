@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from django.core.management import CommandError, call_command
-from django.db import ProgrammingError, connection, transaction
+from django.db import IntegrityError, ProgrammingError, connection, transaction
 from django.test import Client
 from django.utils import timezone
 from pytest_django import Settings
@@ -15,7 +15,8 @@ from pytest_django import Settings
 from leaderboard import audit
 from leaderboard.management.commands.grant import make_role
 from leaderboard.methods import visibility
-from leaderboard.models import Edition, Status, Submission, User
+from leaderboard.models import AuditEvent, Edition, Status, Submission, User
+from leaderboard.models.audit import GENESIS
 from tests import builders
 from tests.editions import corrected, open_edition, publish
 
@@ -106,6 +107,10 @@ def test_it_submits_scores_shows_publishes_and_reads_like_the_owner(
         "'BEGIN RETURN NULL; END'",
         "SET session_replication_role = replica",
         "DELETE FROM django_migrations",
+        # A number that the sequence has yet to give: the action that gets it would fail.
+        "INSERT INTO leaderboard_auditevent (id, at, verb, noun, noun_id, details) "
+        "VALUES (1000000, now(), 'tried', 'Team', '2', '{}')",
+        "SELECT setval(pg_get_serial_sequence('leaderboard_auditevent', 'id'), 9223372036854775807)",
     ],
 )
 def test_it_can_neither_change_the_trail_nor_take_its_guard_off(
@@ -119,6 +124,77 @@ def test_it_can_neither_change_the_trail_nor_take_its_guard_off(
     ):
         cursor.execute(statement)
     assert audit.seal() == audit.verify().n_events == 1
+
+
+def seal_in_sql(event: AuditEvent, *, number: int, after: str, hash_: str) -> None:
+    with connection.cursor() as cursor:
+        cursor.execute(
+            "UPDATE leaderboard_auditevent SET seal_number = %s, previous_hash = %s, hash = %s WHERE id = %s",
+            [number, after, hash_, event.pk],
+        )
+
+
+def recorded(number: int = 1) -> AuditEvent:
+    return audit.record(verb="tried", noun="Team", noun_id=number)
+
+
+@POSTGRESQL_ONLY
+def test_an_event_that_it_seals_with_another_hash_is_named_and_sealing_goes_on(
+    owner: User, as_application: None
+) -> None:
+    recorded()
+    audit.seal()
+    tip = audit.verify().tip
+    forged = [recorded(2), recorded(3)]
+    seal_in_sql(forged[0], number=2, after=tip, hash_="b" * 64)
+    seal_in_sql(forged[1], number=3, after="b" * 64, hash_="a" * 64)
+    for number in range(2):
+        recorded(number)
+        assert audit.seal() == 1
+    verification = audit.verify()
+    assert verification.n_events == 5
+    assert [(each.event_id, each.what) for each in verification.breaks] == [
+        (event.pk, "says something else than when it was written") for event in forged
+    ]
+
+
+@POSTGRESQL_ONLY
+@pytest.mark.parametrize("n_sealed", [0, 2])
+def test_it_gives_no_event_a_hash_that_none_could_follow(n_sealed: int, as_application: None) -> None:
+    for _ in range(n_sealed):
+        recorded()
+    audit.seal()
+    tip = audit.verify().tip
+    forged = recorded()
+    sealed = AuditEvent.objects.exclude(hash=None)
+    for hash_ in {GENESIS, tip, *sealed.values_list("hash", flat=True)}:
+        with pytest.raises(IntegrityError), transaction.atomic():
+            seal_in_sql(forged, number=n_sealed + 1, after=tip, hash_=hash_)
+    assert audit.seal() == 1
+    recorded()
+    assert audit.seal() == 1
+    assert audit.verify().breaks == ()
+
+
+@POSTGRESQL_ONLY
+def test_an_event_whose_hash_it_has_taken_beforehand_waits_alone(
+    as_application: None, caplog: pytest.LogCaptureFixture
+) -> None:
+    """It knows the next event, so it can choose a tip whose next hash is there already."""
+    forged, waiting = [recorded(1), recorded(2)], recorded(3)
+    waiting.refresh_from_db()
+    tip = "a" * 64
+    taken = waiting.hash_after(tip)
+    seal_in_sql(forged[0], number=1, after=GENESIS, hash_=taken)
+    seal_in_sql(forged[1], number=2, after=taken, hash_=tip)
+    assert audit.seal() == 0
+    assert "audit_event_not_sealed" in caplog.text
+    after_it = [recorded(4), recorded(5)]
+    assert audit.seal() == 2
+    assert audit.seal() == 1
+    in_order = AuditEvent.objects.order_by("seal_number")
+    assert [event.pk for event in in_order] == [event.pk for event in (*forged, *after_it, waiting)]
+    assert {each.event_id for each in audit.verify().breaks} == {event.pk for event in forged}
 
 
 def test_without_a_role_nothing_is_granted_and_without_a_password_nothing_is_made(
