@@ -1,9 +1,10 @@
 """One try to deliver a mail, and what the mail server says of it.
 
-A server refuses a mail for good (5xx), puts it off (4xx), or there is no connection. Only the last concerns
-other mails.
+A server refuses a mail for good (5xx), puts it off (4xx), or there is no connection. The last concerns other
+mails, too. So may a refusal that does not blame the mailbox or the text, such as "Relay access denied".
 """
 
+import re
 import smtplib
 from dataclasses import dataclass
 from enum import StrEnum
@@ -21,11 +22,15 @@ MAX_REASON: Final = 200
 _CONNECTION_CODES: Final = frozenset({421, 454, 530, 534, 535, 538})
 _FIRST_PERMANENT: Final = 500
 _TOO_LARGE: Final = 552
+# Enhanced codes (RFC 3463) that blame the mailbox, the address or the text of one mail. 5.1.7 and 5.1.8 blame the
+# sender, 5.7 the rights of whoever sends; without such a code, a server may mean anything.
+_OF_ONE_MAIL: Final = re.compile(r"[45]\.(1\.[1-6]|1\.9|1\.10|2\.\d+|3\.4|6\.\d+)\b", re.ASCII)
 
 
 class Outcome(StrEnum):
     SENT = "sent"
     REFUSED = "refused"
+    REFUSED_PERHAPS_ALL = "refused, perhaps as every mail is"
     PUT_OFF = "put off"
     NO_CONNECTION = "no connection"
 
@@ -77,7 +82,20 @@ def _answered(code: int, answer: bytes | str) -> Delivery:
     reason = f"{code} {_text(answer)}"[:MAX_REASON]
     if code in _CONNECTION_CODES:
         return Delivery(Outcome.NO_CONNECTION, reason)
-    return Delivery(Outcome.REFUSED if code >= _FIRST_PERMANENT else Outcome.PUT_OFF, reason)
+    if code < _FIRST_PERMANENT:
+        return Delivery(Outcome.PUT_OFF, reason)
+    is_of_one = code == _TOO_LARGE or blames_one_mail(reason)
+    return Delivery(Outcome.REFUSED if is_of_one else Outcome.REFUSED_PERHAPS_ALL, reason)
+
+
+def blames_one_mail(reason: str) -> bool:
+    """Tell whether a server's answer is about this mail alone, so that others may be taken.
+
+    >>> blames_one_mail("550 5.1.1 No such user"), blames_one_mail("554 5.7.1 Relay access denied")
+    (True, False)
+    """
+    _, _, text = reason.partition(" ")
+    return _OF_ONE_MAIL.match(text) is not None
 
 
 def _text(answer: bytes | str) -> str:

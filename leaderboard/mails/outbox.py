@@ -2,7 +2,9 @@
 
 Mails of accounts are tried at once; others wait for the workers' sweep or `manage.py send_mails`. Each is
 sent at least once: a crash between sending and saving sends it again. A mail that the server refuses for
-good ends, one that it puts off waits alone, and only a fault of the connection stops a run.
+good ends, one that it puts off waits alone, and only a fault of the connection stops a run. A refusal that may
+concern every mail, such as "Relay access denied", ends a mail only if the server takes another one in the
+same run.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,8 +17,17 @@ from django.core.mail import EmailMessage, get_connection
 from django.db.models import F, QuerySet
 from django.urls import reverse
 
-from leaderboard.mails.delivery import FAULTS, Delivery, Outcome, deliver, no_connection
+from leaderboard.mails.delivery import (
+    FAULTS,
+    Delivery,
+    Outcome,
+    blames_one_mail,
+    deliver,
+    no_connection,
+)
 from leaderboard.models import Mail, MailKind, User
+from leaderboard.ops import faults
+from leaderboard.ops.logs import without_secrets
 
 log = structlog.get_logger(__name__)
 
@@ -96,6 +107,8 @@ def unsent() -> QuerySet[Mail]:
 def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) -> int:
     """Send what is due, oldest first, until there is no connection. Returns how many were sent."""
     n_sent = n_broken = 0
+    refused: list[tuple[Mail, Delivery]] = []
+    last_fault: Delivery | None = None
     due = list(Mail.objects.filter(ended_at=None, due_at__lte=now).order_by("due_at")[:MAX_AT_ONCE])
     connection = get_connection()
     try:
@@ -105,7 +118,8 @@ def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) 
             try:
                 connection.open()
             except FAULTS as fault:
-                _put_off_all(now=now, delivery=no_connection(fault))
+                last_fault = no_connection(fault)
+                _put_off_all(now=now, delivery=last_fault)
                 break
             if not _claimed(mail, now=now):
                 continue  # somebody else sends it
@@ -113,14 +127,40 @@ def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) 
             delivery = deliver(message, connection=connection)
             _note(mail, now=now, delivery=delivery)
             n_sent += delivery.outcome is Outcome.SENT
-            # It may be this mail that the server breaks off at, so the next ones are tried as well.
-            n_broken += delivery.outcome is Outcome.NO_CONNECTION
+            if delivery.outcome is Outcome.NO_CONNECTION:
+                # It may be this mail that the server breaks off at, so the next ones are tried as well.
+                n_broken += 1
+                last_fault = delivery
+            if delivery.outcome is Outcome.REFUSED_PERHAPS_ALL:
+                refused.append((mail, delivery))
             if delivery.outcome is not Outcome.SENT:
                 _close(connection)
                 connection = get_connection()
     finally:
         _close(connection)
+    if n_sent:
+        faults.clear(faults.MAIL)
+        for mail, delivery in refused:
+            _end(mail, now=now, delivery=Delivery(Outcome.REFUSED, delivery.reason))
+    elif last_fault is not None:
+        _note_server(last_fault.reason, now=now)
+    elif refused and len(_refused_recipients()) > 1:
+        _note_server(refused[-1][1].reason, now=now)
     return n_sent
+
+
+def _refused_recipients() -> set[str]:
+    """Return who waits because of an answer that may concern every mail."""
+    rows = put_off().values_list("recipient", "reason")
+    return {recipient for recipient, reason in rows if not blames_one_mail(reason)}
+
+
+def _note_server(reason: str, *, now: datetime) -> None:
+    # It names the recipient, whose mail may be sent later.
+    reason = without_secrets(reason)
+    if faults.note(faults.MAIL, reason=reason, now=now):
+        # A line that is mailed to people would wait as well.
+        log.warning("mail_server_takes_nothing", reason=reason)
 
 
 def _claimed(mail: Mail, *, now: datetime) -> bool:
@@ -177,5 +217,5 @@ def _end(mail: Mail, *, now: datetime, delivery: Delivery) -> None:
     ended: dict[str, Any] = {"subject": "", "text": "", "ended_at": now, "is_sent": is_sent}
     ended |= {"recipient": "", "reason": ""} if is_sent else {"reason": delivery.reason}
     is_mine = Mail.objects.filter(pk=mail.pk, ended_at=None).update(**ended)
-    if is_mine and delivery.outcome in {Outcome.NO_CONNECTION, Outcome.PUT_OFF}:
+    if is_mine and delivery.outcome not in {Outcome.SENT, Outcome.REFUSED}:
         log.error("mail_given_up", mail_id=mail.pk, kind=mail.kind, outcome=delivery.outcome.value)

@@ -14,12 +14,13 @@ from leaderboard.models import Fault
 
 STORE: Final = "file store"
 UPLOADS: Final = "uploads"
+MAIL: Final = "mail server"
 LABEL_CHANGES: Final = "label changes"
 COMPARISONS: Final = "comparisons"
 INTERVALS: Final = "intervals"
 ANALYSES: Final = "analyses"
 STATISTICS: Final = (LABEL_CHANGES, COMPARISONS, INTERVALS, ANALYSES)
-KINDS: Final = (STORE, UPLOADS, *STATISTICS)
+KINDS: Final = (STORE, UPLOADS, MAIL, *STATISTICS)
 STRIKES: Final = "strikes"
 """Only counted: a failed run is no fault that lasts. Its subject is the kind of strike."""
 

@@ -194,10 +194,15 @@ def failing_statistics(*, now: datetime, using: str = "default") -> list[str]:
 
 
 def mails_wait(*, now: datetime, using: str = "default") -> bool:
-    """Say whether a mail waits longer than `MAX_MAIL_AGE` for the mail server alone."""
+    """Say whether mails wait longer than `MAX_MAIL_AGE` for the mail server, which is away or refuses all."""
+    if not settings.SENDS_MAIL:
+        return False
     old = Mail.objects.using(using).filter(ended_at=None, queued_at__lt=now - MAX_MAIL_AGE)
-    # One that the server puts off has a reason of its own.
-    return settings.SENDS_MAIL and old.filter(reason="").exists()
+    # One that the server does not take has a reason of its own, which may be the reason of all.
+    takes_nothing = faults.present([faults.MAIL], now=now, using=using)
+    return old.filter(reason="").exists() or (
+        old.exists() and takes_nothing.filter(began_at__lt=now - MAX_MAIL_AGE).exists()
+    )
 
 
 def _ground_truth(n_without: int) -> Check:

@@ -169,7 +169,7 @@ def _lasting(*, now: datetime) -> Iterator[Metric]:
             present[row.kind] = max(present[row.kind], (now - began_at).total_seconds())
     yield _counter(
         "tsttc_faults",
-        "Failures of the file store, of uploads and of statistics, since the beginning.",
+        "Failures of the file store, of uploads, of the mail server and of statistics, since the beginning.",
         {(kind,): n_ever.get(kind, 0) for kind in faults.KINDS},
         labels=["kind"],
     )

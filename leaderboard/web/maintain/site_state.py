@@ -109,7 +109,12 @@ def _backups(*, now: datetime) -> Line:
 def _mails(*, now: datetime) -> Line:
     if not settings.SENDS_MAIL:
         return Line("Emails", "no mail server is set")
-    return Line("Emails", "".join(_mail_parts(now=now)), is_bad=health.mails_wait(now=now))
+    text = "".join(_mail_parts(now=now))
+    fault = faults.present([faults.MAIL], now=now).first()
+    if fault is None or not outbox.waiting():
+        return Line("Emails", text, is_bad=health.mails_wait(now=now))
+    reason = f"{_lasting('the mail server takes none', fault, now=now)}: {fault.reason}"
+    return Line("Emails", text, True, (reason,))
 
 
 def _mail_parts(*, now: datetime) -> Iterator[str]:

@@ -11,7 +11,8 @@ AT_DATA = {"spam": "554 5.7.1 Not wanted", "later": "451 4.7.1 Greylisted", "cra
 
 
 class Server(socketserver.ThreadingTCPServer):
-    """`taken` has recipients in order. `refusal` is a whole answer to every recipient, or to every sender."""
+    """`taken` has recipients in order. `sender_answer` is for every sender, `recipient_answer` for every recipient
+    and `text_answer` for every text; the last two, if empty, follow from the recipient's name."""
 
     allow_reuse_address = daemon_threads = True
 
@@ -20,6 +21,7 @@ class Server(socketserver.ThreadingTCPServer):
         self.taken: list[str] = []
         self.asked: list[str] = []
         self.sender_answer = "250 ok"
+        self.recipient_answer = self.text_answer = ""
 
     @property
     def port(self) -> int:
@@ -38,14 +40,14 @@ class Session(socketserver.StreamRequestHandler):
             if verb == "RCPT":
                 recipient = line.partition("<")[2].partition(">")[0]
                 self.server.asked.append(recipient)
-                answer = answer_of(recipient, AT_RCPT)
+                answer = self.server.recipient_answer or answer_of(recipient, AT_RCPT)
                 self.say(answer)
                 if answer.startswith("421"):
                     return
             elif verb == "DATA":
                 self.say("354 go on")
                 self.read_text()
-                answer = answer_of(recipient, AT_DATA)
+                answer = self.server.text_answer or answer_of(recipient, AT_DATA)
                 if not answer:
                     return  # the connection breaks
                 if answer.startswith("250"):

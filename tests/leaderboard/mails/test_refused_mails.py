@@ -11,6 +11,7 @@ from pytest_django import Settings
 
 from leaderboard.mails import outbox
 from leaderboard.models import Mail, MailKind, User
+from leaderboard.ops import health
 from tests.leaderboard.mails import smtp_server
 from tests.leaderboard.ops.test_prometheus import figures
 
@@ -53,9 +54,13 @@ def state_of(recipient: str) -> tuple[bool, str, str]:
     return row.ended_at is not None, row.text, row.reason
 
 
-@pytest.mark.parametrize(
-    "dead", ["gone@example.org", "spam@example.org", "a b\n@example.org", "ä" * 70 + "@exa..mple", ""]
-)
+def state_of_all(recipient: str) -> list[tuple[bool, str, str]]:
+    """`state_of` for each mail to somebody."""
+    rows = Mail.objects.filter(recipient=recipient)
+    return [(row.ended_at is not None, row.text, row.reason) for row in rows]
+
+
+@pytest.mark.parametrize("dead", ["gone@example.org", "a b\n@example.org", "ä" * 70 + "@exa..mple", ""])
 def test_refused_recipients_end_their_mails_and_delay_no_other(server: smtp_server.Server, dead: str) -> None:
     queue(*[dead] * 60, "first@example.org", "second@example.org")
     # Even so many cannot fill more than one run.
@@ -93,6 +98,85 @@ def test_a_mail_at_which_the_server_breaks_off_does_not_stop_the_run(
     queue(breaker, breaker, "first@example.org", "second@example.org")
     assert outbox.work_off(now=NOW) == 2
     assert outbox.waiting() == 2
+
+
+OF_THE_SERVER = [
+    "554 5.7.1 <first@example.org>: Relay access denied",
+    "553 5.7.1 <site@example.org>: Sender address rejected: not owned by user",
+    "550 5.7.60 Client does not have permissions to send as this sender",
+    "550 5.1.8 <site@example.org>: Sender address rejected: Domain not found",
+    "550 relay not permitted",
+    "530 5.7.0 Authentication required",
+    "554 5.7.0 Authentication required",
+]
+
+
+@pytest.mark.parametrize("answer", OF_THE_SERVER)
+@pytest.mark.parametrize("step", ["recipient_answer", "text_answer"])
+def test_a_refusal_of_every_mail_ends_none_and_is_shown_until_the_server_takes_one(
+    server: smtp_server.Server, settings: Settings, client: Client, maintainer: User, answer: str, step: str
+) -> None:
+    settings.SENDS_MAIL = True
+    queue("first@example.org", "second@example.org")
+    setattr(server, step, answer)
+    for tries in range(4):
+        assert outbox.work_off(now=NOW + tries * 20 * MINUTE) == 0
+    assert outbox.waiting() == 2
+    assert outbox.unsent().count() == 0
+    assert health.mails_wait(now=NOW + 70 * MINUTE)
+    assert figures()['tsttc_faults_total{kind="mail server"}'] == 4
+    client.force_login(maintainer)
+    page = client.get("/maintain/").text
+    assert "the mail server takes none, 4 times" in page
+    assert answer[:9] in page
+    assert "first@example.org" not in page
+    setattr(server, step, "")
+    assert outbox.work_off(now=NOW + 3 * 60 * MINUTE) == 2
+    assert not health.mails_wait(now=NOW + 3 * 60 * MINUTE)
+    assert "takes none" not in client.get("/maintain/").text
+
+
+def test_a_refusal_that_may_be_of_all_ends_two_mails_once_another_is_taken(server: smtp_server.Server) -> None:
+    spam = ["spam@example.org", "spam@other.example.org"]
+    queue(*spam)
+    assert outbox.work_off(now=NOW) == 0
+    assert outbox.waiting() == 2
+    queue("first@example.org")
+    assert outbox.work_off(now=NOW + MINUTE) == 1
+    assert {mail.recipient: mail.reason for mail in outbox.unsent()} == dict.fromkeys(spam, "554 5.7.1 Not wanted")
+    assert outbox.waiting() == 0
+
+
+def test_one_recipient_whose_refusal_may_be_of_all_is_no_fault_of_the_server(
+    server: smtp_server.Server, settings: Settings
+) -> None:
+    settings.SENDS_MAIL = True
+    queue("spam@example.org", "spam@example.org")
+    for tries in range(4):
+        outbox.work_off(now=NOW + tries * 20 * MINUTE)
+    assert not health.mails_wait(now=NOW + 70 * MINUTE)
+    assert outbox.put_off().count() == 2
+    for hours in range(2, 80):
+        outbox.work_off(now=NOW + timedelta(hours=hours))
+    assert state_of_all("spam@example.org") == [(True, "", "554 5.7.1 Not wanted")] * 2
+
+
+def test_a_mail_that_is_refused_as_all_during_a_request_is_kept(server: smtp_server.Server) -> None:
+    server.recipient_answer = OF_THE_SERVER[0]
+    for recipient in ("first@example.org", "second@example.org"):
+        outbox.send_or_keep(message=EmailMessage("S", "secret link", to=[recipient]), now=NOW)
+    assert outbox.waiting() == 2
+    server.recipient_answer = ""
+    assert outbox.work_off(now=NOW + MINUTE) == 2
+
+
+def test_a_server_that_is_away_is_named_with_its_reason(settings: Settings, keeper: Client) -> None:
+    settings.SENDS_MAIL = True
+    settings.EMAIL_BACKEND = "django.core.mail.backends.smtp.EmailBackend"
+    settings.EMAIL_HOST, settings.EMAIL_PORT = "127.0.0.1", 1
+    queue("first@example.org", "second@example.org")
+    assert outbox.work_off(now=NOW) == 0
+    assert "ConnectionRefusedError" in keeper.get("/maintain/").text
 
 
 def test_a_server_that_refuses_the_sender_loses_no_mail(server: smtp_server.Server) -> None:

@@ -210,6 +210,14 @@ def _write_mail(world: World, *, queued_at: Any) -> Mail:
     return Mail.objects.get(key=key)
 
 
+def _mail_server_takes_nothing(world: World) -> None:
+    world.settings.EMAIL_BACKEND = "django.core.mail.backends.smtp.EmailBackend"
+    world.settings.EMAIL_HOST, world.settings.EMAIL_PORT = "127.0.0.1", 1
+    _write_mail(world, queued_at=timezone.now())
+    assert outbox.work_off(now=timezone.now()) == 0
+    Fault.objects.update(began_at=timezone.now() - 2 * HOUR)
+
+
 def _backup_fails(world: World) -> None:
     run = backup_runs.begin(timezone.now())
     backup_runs.finish(run, now=timezone.now(), is_ok=False, fault="the disk is full")
@@ -269,6 +277,7 @@ FAULTS: list[tuple[str, Callable[[World], None]]] = [
     ("TsttcServerErrors", _answers_are_errors),
     ("TsttcSlow", _boards_are_slow),
     ("TsttcMailsWait", _mail_waits),
+    ("TsttcMailServerFails", _mail_server_takes_nothing),
     ("TsttcMailsRefused", _mails_are_refused),
     ("TsttcAuditUnsealed", _event_is_not_sealed),
     ("TsttcNobodyCleans", _nobody_cleans),
