@@ -8,7 +8,7 @@ from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
 
-from leaderboard.boards import listing
+from leaderboard.boards import listing, snapshots
 from leaderboard.boards.rows import scored_in
 from leaderboard.editions import corrections, ground_truth, history
 from leaderboard.errors.refusals import Refused
@@ -203,7 +203,9 @@ class _Side:
 
 
 def _side(edition: Edition) -> _Side:
-    board = listing.board(split=edition.split, edition=edition, viewer=AnonymousUser())
+    # A published board is kept for its readers; that of a draft is read now.
+    read = snapshots.board if edition.published_at else listing.board
+    board = read(split=edition.split, edition=edition, viewer=AnonymousUser())
     rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None)
     return _Side(
         edition=edition,
