@@ -22,8 +22,8 @@ MAX_REASON: Final = 200
 _CONNECTION_CODES: Final = frozenset({421, 454, 530, 534, 535, 538})
 _FIRST_PERMANENT: Final = 500
 _TOO_LARGE: Final = 552
-# Enhanced codes (RFC 3463) that blame the mailbox, the address or the text of one mail. 5.1.7 and 5.1.8 blame the
-# sender, 5.7 the rights of whoever sends; without such a code, a server may mean anything.
+# Enhanced codes (RFC 3463) that blame the mailbox, the address or the text of one mail. 5.1.7 and 5.1.8
+# blame the sender, 5.7 the rights of whoever sends; without such a code, a server may mean anything.
 _OF_ONE_MAIL: Final = re.compile(r"[45]\.(1\.[1-6]|1\.9|1\.10|2\.\d+|3\.4|6\.\d+)\b", re.ASCII)
 
 

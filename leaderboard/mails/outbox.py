@@ -2,9 +2,9 @@
 
 Mails of accounts are tried at once; others wait for the workers' sweep or `manage.py send_mails`. Each is
 sent at least once: a crash between sending and saving sends it again. A mail that the server refuses for
-good ends, one that it puts off waits alone, and only a fault of the connection stops a run. A refusal that may
-concern every mail, such as "Relay access denied", ends a mail only if the server takes another one in the
-same run.
+good ends, one that it puts off waits alone, and only a fault of the connection stops a run. A refusal that
+may concern every mail, such as "Relay access denied", ends a mail only if the server takes another one in
+the same run.
 """
 
 from collections.abc import Callable, Sequence
@@ -106,61 +106,60 @@ def unsent() -> QuerySet[Mail]:
 
 def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) -> int:
     """Send what is due, oldest first, until there is no connection. Returns how many were sent."""
-    n_sent = n_broken = 0
-    refused: list[tuple[Mail, Delivery]] = []
-    last_fault: Delivery | None = None
+    tried: list[tuple[Mail, Delivery]] = []
     due = list(Mail.objects.filter(ended_at=None, due_at__lte=now).order_by("due_at")[:MAX_AT_ONCE])
     connection = get_connection()
     try:
         for mail in due:
-            if is_stopping() or n_broken == _MAX_BROKEN:
+            # It may be one mail that the server breaks off at, so the next ones are tried as well.
+            if is_stopping() or len(_with(Outcome.NO_CONNECTION, tried)) == _MAX_BROKEN:
                 break
             try:
                 connection.open()
             except FAULTS as fault:
-                last_fault = no_connection(fault)
-                _put_off_all(now=now, delivery=last_fault)
+                tried.append((mail, no_connection(fault)))
+                _put_off_all(now=now, delivery=no_connection(fault))
                 break
             if not _claimed(mail, now=now):
                 continue  # somebody else sends it
             message = EmailMessage(mail.subject, mail.text, to=[mail.recipient], headers=_headers(mail))
             delivery = deliver(message, connection=connection)
+            tried.append((mail, delivery))
             _note(mail, now=now, delivery=delivery)
-            n_sent += delivery.outcome is Outcome.SENT
-            if delivery.outcome is Outcome.NO_CONNECTION:
-                # It may be this mail that the server breaks off at, so the next ones are tried as well.
-                n_broken += 1
-                last_fault = delivery
-            if delivery.outcome is Outcome.REFUSED_PERHAPS_ALL:
-                refused.append((mail, delivery))
             if delivery.outcome is not Outcome.SENT:
                 _close(connection)
                 connection = get_connection()
     finally:
         _close(connection)
-    if n_sent:
+    _note_server(tried, now=now)
+    return len(_with(Outcome.SENT, tried))
+
+
+def _with(outcome: Outcome, tried: list[tuple[Mail, Delivery]]) -> list[tuple[Mail, Delivery]]:
+    return [(mail, delivery) for mail, delivery in tried if delivery.outcome is outcome]
+
+
+def _note_server(tried: list[tuple[Mail, Delivery]], *, now: datetime) -> None:
+    """Say whether the mail server takes mails at all, by what came of a run; end what it refuses alone."""
+    refused = _with(Outcome.REFUSED_PERHAPS_ALL, tried)
+    broken = _with(Outcome.NO_CONNECTION, tried)
+    if _with(Outcome.SENT, tried):
         faults.clear(faults.MAIL)
         for mail, delivery in refused:
             _end(mail, now=now, delivery=Delivery(Outcome.REFUSED, delivery.reason))
-    elif last_fault is not None:
-        _note_server(last_fault.reason, now=now)
-    elif refused and len(_refused_recipients()) > 1:
-        _note_server(refused[-1][1].reason, now=now)
-    return n_sent
+    elif broken or (refused and len(_refused_recipients()) > 1):
+        _, last = (broken or refused)[-1]
+        # It names the recipient, whose mail may be sent later.
+        reason = without_secrets(last.reason)
+        if faults.note(faults.MAIL, reason=reason, now=now):
+            # A line that is mailed to people would wait as well.
+            log.warning("mail_server_takes_nothing", reason=reason)
 
 
 def _refused_recipients() -> set[str]:
     """Return who waits because of an answer that may concern every mail."""
     rows = put_off().values_list("recipient", "reason")
     return {recipient for recipient, reason in rows if not blames_one_mail(reason)}
-
-
-def _note_server(reason: str, *, now: datetime) -> None:
-    # It names the recipient, whose mail may be sent later.
-    reason = without_secrets(reason)
-    if faults.note(faults.MAIL, reason=reason, now=now):
-        # A line that is mailed to people would wait as well.
-        log.warning("mail_server_takes_nothing", reason=reason)
 
 
 def _claimed(mail: Mail, *, now: datetime) -> bool:

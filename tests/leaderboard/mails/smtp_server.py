@@ -11,8 +11,10 @@ AT_DATA = {"spam": "554 5.7.1 Not wanted", "later": "451 4.7.1 Greylisted", "cra
 
 
 class Server(socketserver.ThreadingTCPServer):
-    """`taken` has recipients in order. `sender_answer` is for every sender, `recipient_answer` for every recipient
-    and `text_answer` for every text; the last two, if empty, follow from the recipient's name."""
+    """`taken` has recipients in order. `sender_answer` is for every sender.
+
+    `recipient_answer` is for every recipient and `text_answer` for every text; empty: as its name says.
+    """
 
     allow_reuse_address = daemon_threads = True
 

@@ -136,14 +136,18 @@ def test_a_refusal_of_every_mail_ends_none_and_is_shown_until_the_server_takes_o
     assert "takes none" not in client.get("/maintain/").text
 
 
-def test_a_refusal_that_may_be_of_all_ends_two_mails_once_another_is_taken(server: smtp_server.Server) -> None:
+def test_a_refusal_that_may_be_of_all_ends_two_mails_once_another_is_taken(
+    server: smtp_server.Server,
+) -> None:
     spam = ["spam@example.org", "spam@other.example.org"]
     queue(*spam)
     assert outbox.work_off(now=NOW) == 0
     assert outbox.waiting() == 2
     queue("first@example.org")
     assert outbox.work_off(now=NOW + MINUTE) == 1
-    assert {mail.recipient: mail.reason for mail in outbox.unsent()} == dict.fromkeys(spam, "554 5.7.1 Not wanted")
+    assert {mail.recipient: mail.reason for mail in outbox.unsent()} == dict.fromkeys(
+        spam, "554 5.7.1 Not wanted"
+    )
     assert outbox.waiting() == 0
 
 
