@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final
 
-from django.db import transaction
+from django.db import connection, transaction
 from django.db.models import Max
 
 import evaluator
@@ -22,6 +22,8 @@ from leaderboard.queue import lifecycle
 from leaderboard.statistics import disclosure
 from leaderboard.storage import files, hidden_marks, manifests, truth_values
 
+# Names who imports among PostgreSQL's advisory locks: "truth" in ASCII.
+_IMPORTS: Final = 0x7472757468
 OPEN_PROTOCOL: Final = "tsttc-2"
 """The protocol of an open split's first edition, unless another one is named."""
 
@@ -73,7 +75,15 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
         known = ", ".join(Split.objects.values_list("name", flat=True))
         raise Refused("unknown-split", f"There is no split {split_name!r}; expected one of {known}.")
     truth = evaluator.read_truth(path)
-    require_openable(split, truth)
+    with transaction.atomic():
+        _lock_imports()
+        require_openable(split, truth)
+        return _kept(truth, split=split, source=path.name, now=now, actor=actor)
+
+
+def _kept(
+    truth: evaluator.GroundTruth, *, split: Split, source: str, now: datetime, actor: User | None
+) -> GroundTruth:
     old = split.current_edition.ground_truth if split.current_edition else None
     counts = _compared(old, truth)
     n_in_ranges = {OVERALL: truth.n_sequences, **truth.counts_of(known_ranges().values())}
@@ -83,37 +93,55 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
     _require_own(split, GroundTruth.objects.filter(digest=truth.digest).first())
     truth_values.save(truth, is_hidden=split.is_hidden)
     files.save_manifest(truth.manifest)
-    with transaction.atomic():
-        row, is_new = GroundTruth.objects.get_or_create(
-            digest=truth.digest,
-            defaults={
-                "split_id": split.truth_split_id,
-                "manifest_digest": truth.manifest.digest,
-                "source": path.name[:200],
-                "n_sequences": truth.manifest.n_sequences,
-                "n_recordings": truth.manifest.n_recordings,
-                "counts": n_in_ranges,
-                "imported_at": now,
-                "imported_by": actor,
-            },
-        )
-        _require_own(split, row)
-        if row.counts != n_in_ranges:  # counted before a protocol with other TTC ranges was known
-            row.counts = {**row.counts, **n_in_ranges}
-            row.save(update_fields=["counts"])
-        if old is not None and counts is not None:
-            _keep_comparison(old, row, counts)
-        if is_new:
-            audit.record_of(row, "imported", actor=actor)
+    row, is_new = GroundTruth.objects.get_or_create(
+        digest=truth.digest,
+        defaults={
+            "split_id": split.truth_split_id,
+            "manifest_digest": truth.manifest.digest,
+            "source": source[:200],
+            "n_sequences": truth.manifest.n_sequences,
+            "n_recordings": truth.manifest.n_recordings,
+            "counts": n_in_ranges,
+            "imported_at": now,
+            "imported_by": actor,
+        },
+    )
+    _require_own(split, row)
+    if row.counts != n_in_ranges:  # counted before a protocol with other TTC ranges was known
+        row.counts = {**row.counts, **n_in_ranges}
+        row.save(update_fields=["counts"])
+    if old is not None and counts is not None:
+        _keep_comparison(old, row, counts)
+    if is_new:
+        audit.record_of(row, "imported", actor=actor)
     return row
 
 
+def _lock_imports() -> None:
+    """Keep other imports waiting until the transaction ends: of two with one sequence, one sees the other."""
+    # SQLite has one writer at a time: a transaction that begins IMMEDIATE is it.
+    if connection.vendor == "postgresql":
+        with connection.cursor() as cursor:
+            cursor.execute("SELECT pg_advisory_xact_lock(%s)", [_IMPORTS])
+
+
+def mark_hidden() -> int:
+    """Mark the values of every hidden split that were saved before there were marks. Returns how many.
+
+    Raises `OSError` where the private directory cannot be written.
+    """
+    hidden = GroundTruth.objects.filter(split__is_hidden=True).order_by("imported_at", "digest")
+    return truth_values.mark_hidden(hidden.values_list("digest", flat=True))
+
+
 def require_openable(split: Split, truth: evaluator.GroundTruth) -> None:
-    """Raise `Refused` if the split is open, and the ground truth has sequences of a hidden one.
+    """Raise `Refused` if the ground truth has sequences of a hidden split and of an open one.
 
     An open split shows errors of single sequences, from which anybody computes true values.
     """
+    mark_hidden()
     if split.is_hidden:
+        _require_no_open_twin(split, truth)
         return
     twin = truth_values.hidden_with(truth.manifest)
     former = GroundTruth.objects.filter(split=split.truth_split_id).order_by("imported_at", "digest")
@@ -130,6 +158,24 @@ def require_openable(split: Split, truth: evaluator.GroundTruth) -> None:
         f"The split {split.pk!r} is open, and {why}. An open split shows the errors of single sequences, "
         "which would give the hidden values away; expected a ground truth without sequences of a hidden "
         f"split. If the split {split.pk!r} was hidden before, somebody has changed the database.",
+    )
+
+
+def _require_no_open_twin(split: Split, truth: evaluator.GroundTruth) -> None:
+    rows = GroundTruth.objects.filter(split__is_hidden=False).exclude(split=split.truth_split_id)
+    # The very same one is refused as another split's.
+    rows = rows.exclude(digest=truth.digest)
+    opened = {row.digest: row for row in rows.order_by("imported_at", "digest")}
+    twin = truth_values.common_with(truth.manifest, opened)
+    if twin is None:
+        return
+    digest, key = twin
+    row = opened[digest]
+    raise Refused(
+        "edition-refused",
+        f"The split {split.pk!r} is hidden, and the sequence {key} is in the ground truth {row.short_digest} "
+        f"of the open split {row.split_id!r} too. An open split shows the errors of single sequences, so "
+        "their true values are known; expected a ground truth without sequences of an open split.",
     )
 
 

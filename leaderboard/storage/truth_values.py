@@ -1,6 +1,7 @@
 """Ground-truth values: in a private directory, written by maintainers' commands, read by workers only."""
 
 import os
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
@@ -40,12 +41,29 @@ def hidden_with(manifest: evaluator.Manifest) -> tuple[str, str] | None:
 
     It asks the private directory alone: the database does not decide what is hidden.
     """
+    return common_with(manifest, hidden_marks.digests())
+
+
+def common_with(manifest: evaluator.Manifest, digests: Iterable[str]) -> tuple[str, str] | None:
+    """Return the first of these ground truths that has a sequence of the manifest, and the key of one."""
     keys = frozenset(manifest.natural_keys)
-    for digest in hidden_marks.digests():
+    for digest in digests:
         common = keys.intersection(_manifest_keys(digest))
         if common:
             return digest, min(common)
     return None
+
+
+def mark_hidden(digests: Iterable[str]) -> int:
+    """Mark values that were saved before there were marks. Returns how many. Raises `OSError`."""
+    unmarked = [digest for digest in digests if not hidden_marks.is_marked(digest) and _is_kept(digest)]
+    for digest in unmarked:
+        hidden_marks.put(digest)
+    return len(unmarked)
+
+
+def _is_kept(digest: str) -> bool:
+    return values_path(digest).exists() or manifest_path(digest).exists()
 
 
 @lru_cache(maxsize=4)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from threading import Barrier
 from typing import TypeVar
 
@@ -10,14 +11,17 @@ import pytest
 from django.db import connection
 
 from leaderboard import audit
+from leaderboard.editions import ground_truth, splits
 from leaderboard.errors.refusals import Refused
 from leaderboard.methods import visibility
 from leaderboard.models import (
     Edition,
     Evaluation,
+    GroundTruth,
     Invitation,
     Membership,
     Method,
+    PublishedResult,
     Split,
     Submission,
     Team,
@@ -26,6 +30,7 @@ from leaderboard.models import (
 )
 from leaderboard.people import invitations, teams, tokens
 from leaderboard.quotas import usage
+from leaderboard.storage import hidden_marks
 from tests import builders
 from tests.services import ON_POSTGRESQL, crowd_on_postgres
 
@@ -187,6 +192,68 @@ def test_of_methods_that_look_alike_one_alone_is_shown_at_once(db: None) -> None
 
     assert sum(at_once(8, show)) == 1
     assert Method.objects.filter(visibility=Visibility.PUBLIC).count() == 1
+
+
+def test_rows_of_papers_and_methods_that_look_alike_are_not_both_shown_at_once(edition: Edition) -> None:
+    people = [User.objects.create_user(f"{i}@example.org") for i in range(8)]
+    names = [f"Owl Net {number // 2}" for number in range(8)]
+    methods = [
+        Method.objects.create(
+            team=teams.create(user=user, name=f"Team number {number}", now=FIRST_DAY),
+            name=names[number],
+            created_at=FIRST_DAY,
+        )
+        for number, user in enumerate(people)
+    ]
+    scores = dict.fromkeys(edition.rules.score_names, 1.0)
+
+    def show(number: int) -> bool:
+        try:
+            if number % 2:
+                visibility.change(
+                    method=methods[number], visibility=Visibility.PUBLIC, actor=people[number], now=FIRST_DAY
+                )
+            else:
+                source = {"title": "T", "authors": "A", "table": "1", "url": "https://a.example", "year": 2024}
+                document = {
+                    "source": source,
+                    "columns": list(scores),
+                    "methods": [{"slug": f"row-{number}", "name": f"({names[number]})"}],
+                    "results": {"test": {f"row-{number}": list(scores.values())}},
+                }
+                splits.import_published(document=document, now=FIRST_DAY)
+        except Refused:
+            return False
+        return True
+
+    assert sum(at_once(8, show)) == 4
+    public = Method.objects.filter(visibility=Visibility.PUBLIC).values_list("name", flat=True)
+    quoted = PublishedResult.objects.filter(slug__startswith="row-").values_list("method_name", flat=True)
+    assert sorted([*public, *(name.strip("()") for name in quoted)]) == names[::2]
+
+
+def test_of_an_open_and_a_hidden_split_one_alone_gets_the_same_sequences_at_once(
+    benchmark: None, tmp_path: Path
+) -> None:
+    truths = [
+        builders.truth_csv(tmp_path / f"{split}.csv", seed=seed)
+        for seed, split in enumerate(["val", "demo", "test"])
+    ]
+
+    def take(number: int) -> bool:
+        try:
+            ground_truth.import_truth(
+                split_name=truths[number % 3].stem, path=truths[number % 3], now=FIRST_DAY
+            )
+        except Refused:
+            return False
+        return True
+
+    at_once(6, take)
+    hidden = GroundTruth.objects.filter(split__is_hidden=True).exists()
+    opened = GroundTruth.objects.filter(split__is_hidden=False).exists()
+    assert (hidden, opened) in {(True, False), (False, True)}
+    assert bool(hidden_marks.digests()) == hidden
 
 
 def test_methods_that_look_alike_at_once_are_one(edition: Edition, owner: User) -> None:

@@ -154,3 +154,110 @@ def test_open_splits_with_sequences_of_their_own_open_as_ever(hidden: Edition, t
     second = open_edition(again, split="val")
     assert not hidden_marks.is_marked(demo.ground_truth_id)
     assert not hidden_marks.is_marked(second.ground_truth_id)
+
+
+# --- the other order: the open one is there first -----------------------------------------------------------
+
+
+def renumbered(tmp_path: Path, *, keep_own_keys: bool) -> Path:
+    """A hidden ground truth of other values: the sequences of val renumbered, or its numbers alone."""
+    rows = [row.split(",") for row in (tmp_path / "truth-val.csv").read_text().splitlines()]
+    lines = [",".join(rows[0])]
+    for i, (anno_id, bag, cam, ts, track, ttc) in enumerate(rows[1:]):
+        number = str(7_000 + i) if keep_own_keys else anno_id
+        key = (bag, cam, ts, track) if keep_own_keys else (bag, cam, str(int(ts) + 1), track)
+        lines.append(",".join([number, *key, repr(float(ttc) * 1.5)]))
+    path = tmp_path / f"renumbered-{keep_own_keys}.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture
+def opened(benchmark: None, tmp_path: Path) -> Edition:
+    """The val split, open, before there is any hidden ground truth."""
+    return builders.import_truth(tmp_path, split="val")
+
+
+def test_a_hidden_split_takes_no_sequence_of_an_open_one(opened: Edition, tmp_path: Path) -> None:
+    before = sorted(settings.GROUND_TRUTH_DIR.iterdir())
+    shared = half(tmp_path / "truth-val.csv", tmp_path / "half.csv")
+    for path in (shared, renumbered(tmp_path, keep_own_keys=True)):
+        for door in (
+            lambda path=path: ground_truth.import_truth(split_name="test", path=path, now=NOW()),
+            lambda path=path: call_command("import_truth", "test", str(path)),
+        ):
+            with pytest.raises((Refused, CommandError)) as caught:
+                door()
+            assert (
+                f"is in the ground truth {opened.ground_truth.short_digest} of the open split 'val' too"
+                in str(caught.value)
+            )
+            assert "expected a ground truth without sequences of an open split" in str(caught.value)
+    assert sorted(settings.GROUND_TRUTH_DIR.iterdir()) == before
+    assert GroundTruth.objects.count() == 1
+
+
+def test_a_correction_of_a_hidden_split_takes_no_sequence_of_an_open_one(
+    hidden: Edition, tmp_path: Path
+) -> None:
+    path = half(tmp_path / "truth-val.csv", tmp_path / "both.csv", own=tmp_path / "truth-test.csv")
+    for door in (
+        lambda: open_edition(path),
+        lambda: label_changes.load(split_name="test", path=path),
+    ):
+        with pytest.raises(Refused, match="of the open split 'val' too"):
+            door()
+    assert GroundTruth.objects.count() == 2
+
+
+@pytest.mark.parametrize("first", ["val", "test"])
+def test_the_same_numbers_for_other_sequences_are_no_common_sequences(
+    benchmark: None, tmp_path: Path, first: str
+) -> None:
+    builders.import_truth(tmp_path, split="val")
+    path = renumbered(tmp_path, keep_own_keys=False)
+    if first == "val":
+        hidden = ground_truth.import_truth(split_name="test", path=path, now=NOW())
+        assert hidden_marks.is_marked(hidden.ground_truth_id)
+    else:
+        second = ground_truth.import_truth(split_name="test", path=path, now=NOW())
+        again = half(tmp_path / "truth-val.csv", tmp_path / "again.csv")
+        assert not hidden_marks.is_marked(open_edition(again, split="val").ground_truth_id)
+        assert hidden_marks.is_marked(second.ground_truth_id)
+
+
+# --- hidden ground truth from before there were marks -------------------------------------------------------
+
+
+def unmark(edition: Edition) -> None:
+    hidden_marks.path(edition.ground_truth_id).unlink()
+
+
+def test_hidden_values_from_before_there_were_marks_are_marked_with_the_next_import(
+    hidden: Edition, tmp_path: Path
+) -> None:
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    for edition in (hidden, second):
+        unmark(edition)
+    with pytest.raises(Refused, match="is in the hidden ground truth"):
+        open_edition(mixed(tmp_path), split="val")
+    assert hidden_marks.digests() == tuple(sorted([hidden.ground_truth_id, second.ground_truth_id]))
+
+
+def test_the_command_of_an_upgrade_marks_hidden_values_and_no_others(
+    hidden: Edition, tmp_path: Path
+) -> None:
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    for edition in (hidden, second):
+        unmark(edition)
+    out = StringIO()
+    call_command("make_seed_key", stdout=out)
+    assert "2 hidden ground truths had no mark, and have one now." in out.getvalue()
+    assert hidden_marks.digests() == tuple(sorted([hidden.ground_truth_id, second.ground_truth_id]))
+    call_command("make_seed_key", stdout=(out := StringIO()))
+    assert "mark" not in out.getvalue()
+    # Values that are on another machine are not marked here, and no mark is made of nothing.
+    for path in (truth_values.values_path, truth_values.manifest_path):
+        path(second.ground_truth_id).unlink()
+    unmark(second)
+    assert ground_truth.mark_hidden() == 0
