@@ -56,9 +56,13 @@ validation: $(DEV_STAMP) ## print the tables of docs/validation.md and the figur
 bench: $(DEV_STAMP) ## measure the figures of docs/capacity.md and compare them with their targets
 	@$(PY) -m benchmarks
 
+# PyPI has Biome for Linux on x86_64 alone; CI runs there.
+BIOME := $(if $(filter Linux-x86_64,$(shell uname -sm | tr ' ' -)),$(VENV)/bin/biome,@echo "styles and scripts are not looked at here: biome")
+
 lint: $(DEV_STAMP) ## check style, types, import layers and migrations
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
+	$(BIOME) format static
 	$(PY) -m mypy .
 	$(VENV)/bin/lint-imports
 	$(PY) manage.py makemigrations --check --dry-run
@@ -66,6 +70,7 @@ lint: $(DEV_STAMP) ## check style, types, import layers and migrations
 format: $(DEV_STAMP) ## format the code
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
+	$(BIOME) format --write static
 
 screenshots: $(DEV_STAMP) ## take the README's screenshots of the demo, into docs/screenshots/
 	$(PY) -m tests.browser.screenshots

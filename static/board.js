@@ -18,19 +18,25 @@ document.addEventListener("htmx:afterSettle", () => {
   const address = view()?.dataset.address;
   if (address) history.replaceState(null, "", address);
   for (const fault of document.querySelectorAll(".fault")) {
-    document.querySelector(`[aria-describedby="${fault.id}"]`)?.setAttribute("aria-invalid", String(fault.textContent !== ""));
+    document
+      .querySelector(`[aria-describedby="${fault.id}"]`)
+      ?.setAttribute("aria-invalid", String(fault.textContent !== ""));
   }
 });
 
 // --- menus close where one clicks beside them, and with Escape -------------------------------------------
 
 // A menu ends above the tray and the end of the window.
-document.addEventListener("toggle", ({ target }) => {
-  const body = target.open && target.matches("details.menu") && target.querySelector(".menu-body");
-  if (!body) return;
-  const end = tray && !tray.hidden ? tray.getBoundingClientRect().top : innerHeight;
-  body.style.maxHeight = `${Math.max(160, end - body.getBoundingClientRect().top - 8)}px`;
-}, true);
+document.addEventListener(
+  "toggle",
+  ({ target }) => {
+    const body = target.open && target.matches("details.menu") && target.querySelector(".menu-body");
+    if (!body) return;
+    const end = tray && !tray.hidden ? tray.getBoundingClientRect().top : innerHeight;
+    body.style.maxHeight = `${Math.max(160, end - body.getBoundingClientRect().top - 8)}px`;
+  },
+  true,
+);
 const closeMenus = (except) => {
   for (const menu of document.querySelectorAll("details.menu[open]")) if (menu !== except) menu.open = false;
 };
@@ -73,7 +79,9 @@ const address = (methods) => {
 const words = (n) => {
   if (n === 0) return `Tick 2 to ${MAX_METHODS} methods.`;
   if (n === 1) return `1 method selected; tick at least one more.`;
-  return n === MAX_METHODS ? `${n} methods selected, which is the maximum.` : `${n} of at most ${MAX_METHODS} methods selected.`;
+  return n === MAX_METHODS
+    ? `${n} methods selected, which is the maximum.`
+    : `${n} of at most ${MAX_METHODS} methods selected.`;
 };
 
 function show(methods, isAsked = false) {
@@ -136,11 +144,15 @@ document.addEventListener("htmx:afterSettle", offerCopies);
 document.addEventListener("click", async ({ target }) => {
   const button = target.closest("[data-copy-from]");
   if (!button) return;
-  const text = fetch(button.dataset.copyFrom).then((answer) => (answer.ok ? answer.text() : Promise.reject(answer.statusText)));
+  const text = fetch(button.dataset.copyFrom).then((answer) =>
+    answer.ok ? answer.text() : Promise.reject(answer.statusText),
+  );
   try {
     // Given as a promise, the text may come after the click, which Safari would refuse else.
     const type = "text/plain";
-    await navigator.clipboard.write([new ClipboardItem({ [type]: text.then((found) => new Blob([found], { type })) })]);
+    await navigator.clipboard.write([
+      new ClipboardItem({ [type]: text.then((found) => new Blob([found], { type })) }),
+    ]);
     button.textContent = "Copied";
   } catch {
     button.textContent = "Not copied";

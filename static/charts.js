@@ -58,18 +58,38 @@
     whisker: (ink) => (_, api) => {
       const [x, low] = api.coord([api.value(0), api.value(1)]);
       const high = api.coord([api.value(0), api.value(2)])[1];
-      const line = (x1, y1, x2, y2) => ({ type: "line", shape: { x1, y1, x2, y2 }, style: { stroke: ink, lineWidth: 1.5 } });
-      return { type: "group", children: [line(x, low, x, high), line(x - 3, low, x + 3, low), line(x - 3, high, x + 3, high)] };
+      const line = (x1, y1, x2, y2) => ({
+        type: "line",
+        shape: { x1, y1, x2, y2 },
+        style: { stroke: ink, lineWidth: 1.5 },
+      });
+      return {
+        type: "group",
+        children: [line(x, low, x, high), line(x - 3, low, x + 3, low), line(x - 3, high, x + 3, high)],
+      };
     },
-    strip: (ink) => ({ coordSys }, api) => {
-      const [left, right] = [0, 1].map((end) => api.coord([api.value(end), api.value(2)])[0]);
-      return { type: "rect", shape: { x: left, y: coordSys.y, width: right - left, height: coordSys.height }, style: { fill: ink } };
-    },
+    strip:
+      (ink) =>
+      ({ coordSys }, api) => {
+        const [left, right] = [0, 1].map((end) => api.coord([api.value(end), api.value(2)])[0]);
+        return {
+          type: "rect",
+          shape: { x: left, y: coordSys.y, width: right - left, height: coordSys.height },
+          style: { fill: ink },
+        };
+      },
     // Drawn once, through all of its points.
     band: (ink) => (place, api) => {
       if (place.dataIndexInside) return null;
-      const along = (end) => Array.from({ length: place.dataInsideLength }, (_, i) => api.coord([api.value(0, i), api.value(end, i)]));
-      return { type: "polygon", shape: { points: [...along(1), ...along(2).reverse()] }, style: { fill: ink, opacity: 0.2 } };
+      const along = (end) =>
+        Array.from({ length: place.dataInsideLength }, (_, i) =>
+          api.coord([api.value(0, i), api.value(end, i)]),
+        );
+      return {
+        type: "polygon",
+        shape: { points: [...along(1), ...along(2).reverse()] },
+        style: { fill: ink, opacity: 0.2 },
+      };
     },
   };
 
@@ -79,7 +99,9 @@
     if (option === null || typeof option !== "object") return option;
     if (Array.isArray(option)) return option.map((each) => resolved(each, ink, chart));
     if (option.call) return CALLS[option.call](resolved(option.of, ink, chart), chart);
-    return Object.fromEntries(Object.entries(option).map(([key, value]) => [key, resolved(value, ink, chart)]));
+    return Object.fromEntries(
+      Object.entries(option).map(([key, value]) => [key, resolved(value, ink, chart)]),
+    );
   }
 
   function draw(chart, options, ink, font) {
@@ -118,7 +140,9 @@
     moved() {
       this.found = null;
       // On paper it is as wide as the sheet.
-      this.drawing.querySelector("svg")?.setAttribute("viewBox", `0 0 ${this.chart.getWidth()} ${this.chart.getHeight()}`);
+      this.drawing
+        .querySelector("svg")
+        ?.setAttribute("viewBox", `0 0 ${this.chart.getWidth()} ${this.chart.getHeight()}`);
     }
 
     follow() {
@@ -145,7 +169,9 @@
       });
       this.plot.addEventListener("pointerleave", () => this.hide());
       drawing.addEventListener("click", (event) => this.click(event));
-      drawing.addEventListener("dblclick", () => chart.dispatchAction({ type: "dataZoom", start: 0, end: 100 }));
+      drawing.addEventListener("dblclick", () =>
+        chart.dispatchAction({ type: "dataZoom", start: 0, end: 100 }),
+      );
       drawing.addEventListener("keydown", (event) => this.key(event));
       drawing.addEventListener("blur", () => this.hide());
     }
@@ -166,7 +192,9 @@
     }
 
     isInside([x, y], margin) {
-      return [-margin, margin].some((dx) => [-margin, margin].some((dy) => this.chart.containPixel("grid", [x + dx, y + dy])));
+      return [-margin, margin].some((dx) =>
+        [-margin, margin].some((dy) => this.chart.containPixel("grid", [x + dx, y + dy])),
+      );
     }
 
     // The nearest mark in both directions; of a bar or a step the one above or below the pointer.
@@ -174,7 +202,8 @@
       if (!this.isInside([x, y], 10)) return null;
       const far = ({ at, isUpright }) => Math.hypot(at[0] - x, isUpright ? 0 : at[1] - y);
       let best = null;
-      for (const each of this.marks()) if (far(each) <= NEAR_PX && (!best || far(each) < far(best))) best = each;
+      for (const each of this.marks())
+        if (far(each) <= NEAR_PX && (!best || far(each) < far(best))) best = each;
       return best;
     }
 
@@ -195,7 +224,14 @@
     key(event) {
       const all = this.marks();
       const i = all.indexOf(this.current);
-      const steps = { ArrowRight: i + 1, ArrowDown: i + 1, ArrowLeft: i < 0 ? -1 : i - 1, ArrowUp: i < 0 ? -1 : i - 1, Home: 0, End: -1 };
+      const steps = {
+        ArrowRight: i + 1,
+        ArrowDown: i + 1,
+        ArrowLeft: i < 0 ? -1 : i - 1,
+        ArrowUp: i < 0 ? -1 : i - 1,
+        Home: 0,
+        End: -1,
+      };
       if (event.key === "Enter") return this.open(false);
       if (event.key === "Escape") return this.hide();
       if (!(event.key in steps) || !all.length) return undefined;
@@ -214,9 +250,12 @@
       if (near === this.current) return;
       this.current = near;
       const [x, y] = near.at;
-      const same = this.marks().filter((each) => each !== near && Math.hypot(each.at[0] - x, each.at[1] - y) <= SAME_PX);
+      const same = this.marks().filter(
+        (each) => each !== near && Math.hypot(each.at[0] - x, each.at[1] - y) <= SAME_PX,
+      );
       const told = [near, ...same.slice(0, MAX_TOGETHER - 1)].map(({ mark }) => entryOf(mark));
-      if (same.length >= MAX_TOGETHER) told.push(element("p", "", `and ${same.length + 1 - MAX_TOGETHER} more here`));
+      if (same.length >= MAX_TOGETHER)
+        told.push(element("p", "", `and ${same.length + 1 - MAX_TOGETHER} more here`));
       this.card.replaceChildren(...told);
       this.card.setAttribute("role", isSpoken ? "status" : "presentation");
       this.card.hidden = this.ring.hidden = false;

@@ -4,7 +4,9 @@
 
 (() => {
   const lens = document.getElementById("lens");
-  const [slider, speed, time, vehicle] = ["slider", "speed", "time", "vehicle"].map((name) => document.getElementById(`lens-${name}`));
+  const [slider, speed, time, vehicle] = ["slider", "speed", "time", "vehicle"].map((name) =>
+    document.getElementById(`lens-${name}`),
+  );
   const rows = [...document.querySelectorAll("#lens-table tbody tr")].map(({ dataset, cells }) => ({
     middle: (Number(dataset.low) + Number(dataset.high)) / 2,
     seconds: [...cells].slice(1).map((cell) => (cell.dataset.seconds ? Number(cell.dataset.seconds) : null)),
@@ -12,7 +14,10 @@
   const curves = [...lens.querySelectorAll("dl > div")].map((entry, i) => ({
     meter: entry.querySelector("meter"),
     text: entry.querySelector("dd span"),
-    points: rows.filter(({ seconds }) => seconds[i] !== null).map(({ middle, seconds }) => [middle, seconds[i]]).reverse(),
+    points: rows
+      .filter(({ seconds }) => seconds[i] !== null)
+      .map(({ middle, seconds }) => [middle, seconds[i]])
+      .reverse(),
   }));
   const NEAREST_S = 1; // below it the vehicle would fill the scene
 

@@ -30,7 +30,9 @@ document.addEventListener("click", async ({ target }) => {
 });
 
 // The documentation has many examples: each gets its button, in room that the stylesheet keeps. Outputs get none.
-for (const example of document.querySelectorAll(".docs pre:has(code:not(.language-console, .language-text))")) {
+for (const example of document.querySelectorAll(
+  ".docs pre:has(code:not(.language-console, .language-text))",
+)) {
   const button = document.createElement("button");
   button.type = "button";
   button.className = "copy";
@@ -40,7 +42,8 @@ for (const example of document.querySelectorAll(".docs pre:has(code:not(.languag
 }
 // Code that scrolls is reached by the keyboard.
 const reached = new ResizeObserver((entries) => {
-  for (const { target } of entries) target.scrollWidth > target.clientWidth ? (target.tabIndex = 0) : target.removeAttribute("tabindex");
+  for (const { target } of entries)
+    target.scrollWidth > target.clientWidth ? (target.tabIndex = 0) : target.removeAttribute("tabindex");
 });
 for (const code of document.querySelectorAll(".docs pre > code")) reached.observe(code);
 
@@ -59,6 +62,7 @@ for (const message of document.querySelectorAll(".messages .message")) {
 
 for (const box of document.querySelectorAll("input.show-password")) {
   box.addEventListener("change", () => {
-    for (const field of box.form.querySelectorAll("input[name*=password]")) field.type = box.checked ? "text" : "password";
+    for (const field of box.form.querySelectorAll("input[name*=password]"))
+      field.type = box.checked ? "text" : "password";
   });
 }

@@ -80,14 +80,21 @@ function verdictOnValue(value) {
   const values = isObject(predictions) ? Object.values(predictions) : [];
   const n = counted(values.length, "prediction");
   if (values.length && values.every((each) => each === null)) {
-    return bad(`This is the empty template: all ${grouped(values.length)} values are null; expected a number for every sequence.`);
+    return bad(
+      `This is the empty template: all ${grouped(values.length)} values are null; expected a number for every sequence.`,
+    );
   }
   const split = form.querySelector("input[name=split]:checked");
   const expected = Number(split?.dataset.nSequences ?? 0);
   if (expected && values.length !== expected) {
-    return bad(`The file has ${n}; ${split.dataset.title} expects ${grouped(expected)}, one for each sequence.`);
+    return bad(
+      `The file has ${n}; ${split.dataset.title} expects ${grouped(expected)}, one for each sequence.`,
+    );
   }
-  return ["good", `${n}${expected ? ", one for each sequence" : ""}. The server checks them once the file is sent.`];
+  return [
+    "good",
+    `${n}${expected ? ", one for each sequence" : ""}. The server checks them once the file is sent.`,
+  ];
 }
 
 const bad = (sentence) => ["bad", `${sentence} The server would reject the file.`];
@@ -102,7 +109,9 @@ const method = form.querySelector("input[name=method]");
 const notices = byId("notices");
 
 method.addEventListener("input", () => {
-  const found = [...document.querySelectorAll("#methods option")].find((option) => option.value === method.value.trim());
+  const found = [...document.querySelectorAll("#methods option")].find(
+    (option) => option.value === method.value.trim(),
+  );
   const told = found?.dataset.notice ? [element("p", found.dataset.notice)] : [];
   notices.replaceChildren(...told);
 });
@@ -155,7 +164,10 @@ function send() {
   request.setRequestHeader("Accept", "application/json, text/html");
   request.upload.addEventListener("progress", ({ loaded, total }) => {
     const percent = Math.round((100 * loaded) / total);
-    progress(loaded < total ? `Sending: ${percent}%` : "Sent. The server saves the file…", loaded < total ? loaded / total : null);
+    progress(
+      loaded < total ? `Sending: ${percent}%` : "Sent. The server saves the file…",
+      loaded < total ? loaded / total : null,
+    );
   });
   request.addEventListener("load", () => received(request));
   request.addEventListener("error", () => lost());
@@ -172,7 +184,8 @@ function received(request) {
   busy(false);
   const answer = new DOMParser().parseFromString(request.responseText, "text/html");
   if (answer.getElementById("submit")) correct(answer);
-  else if (request.status === 403 || new URL(request.responseURL).pathname !== location.pathname) sessionEnded();
+  else if (request.status === 403 || new URL(request.responseURL).pathname !== location.pathname)
+    sessionEnded();
   else replace(answer);
 }
 
@@ -229,7 +242,9 @@ function replace(answer) {
 function lost() {
   busy(false);
   progress("", 0);
-  complain(element("p", "The connection was lost. You can submit the same file again safely: it counts once."));
+  complain(
+    element("p", "The connection was lost. You can submit the same file again safely: it counts once."),
+  );
 }
 
 function complain(words) {
