@@ -214,7 +214,8 @@ def test_rows_of_papers_and_methods_that_look_alike_are_not_both_shown_at_once(e
                     method=methods[number], visibility=Visibility.PUBLIC, actor=people[number], now=FIRST_DAY
                 )
             else:
-                source = {"title": "T", "authors": "A", "table": "1", "url": "https://a.example", "year": 2024}
+                about = {"title": "T", "authors": "A", "table": "1", "year": 2024}
+                source = {**about, "url": "https://a.example"}
                 document = {
                     "source": source,
                     "columns": list(scores),
