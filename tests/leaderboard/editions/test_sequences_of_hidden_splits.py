@@ -244,9 +244,7 @@ def test_hidden_values_from_before_there_were_marks_are_marked_with_the_next_imp
     assert hidden_marks.digests() == tuple(sorted([hidden.ground_truth_id, second.ground_truth_id]))
 
 
-def test_the_command_of_an_upgrade_marks_hidden_values_and_no_others(
-    hidden: Edition, tmp_path: Path
-) -> None:
+def test_the_command_of_an_upgrade_marks_hidden_values_and_no_others(hidden: Edition, tmp_path: Path) -> None:
     second = open_edition(corrected(tmp_path, factor=1.3))
     for edition in (hidden, second):
         unmark(edition)
