@@ -41,7 +41,7 @@ _LOST: Final = frozenset(
     }
 )
 # What they act on need not be here.
-_MAKING: Final = frozenset({"added", "imported", "opened", "announced"})
+_MAKING: Final = frozenset({"added", "imported", "opened", "announced", "acknowledged"})
 _FIRST: Final = frozenset(
     {
         *("revoked", "forgotten", "closed", "hidden", "withdrawn", "removed", "cleared", "shown", "deleted"),

@@ -18,7 +18,7 @@ from django.db import Error as DatabaseProblem
 from django.db import connection
 
 from leaderboard import audit
-from leaderboard.backups import contents, copies, database
+from leaderboard.backups import contents, copies, database, losses
 from leaderboard.backups.contents import Contents, NoBackup
 from leaderboard.db import clock
 from leaderboard.ops import backup_runs
@@ -32,7 +32,8 @@ _ROWS: Final = re.compile(r"database-\d{8}T\d{12}")
 def make(*, into: str, now: datetime) -> Contents:
     """Write a backup of the whole site into a folder, which may have an earlier one and files of others.
 
-    The run is recorded in the database. Files that are lost, damaged or unreadable are in `faults`.
+    The run is recorded in the database. Files that are lost, damaged or unreadable are in `faults`, those
+    that a maintainer has acknowledged as lost in `known_lost`.
     Raises `NoBackup`, `OSError` and the database's error; an earlier backup then stays as it was.
     """
     run = backup_runs.begin(now)
@@ -50,8 +51,10 @@ def make(*, into: str, now: datetime) -> Contents:
         is_ok=not made.faults,
         n_files=len(made.files) + len(made.ground_truth),
         n_damaged=len(made.faults),
+        n_lost=len(made.known_lost),
         fault=contents.listed_faults(made.faults),
     )
+    losses.forget_all_but({*made.known_lost, *made.faults})
     return made
 
 
@@ -102,6 +105,11 @@ def _saved(folder: Path, rows: Path, former: Contents | None, *, now: datetime) 
         # What workers make again is no loss.
         if copy.fault and name not in remade:
             faults[name] = copy.fault
+    kept_files = {name: digest for name, digest in kept.items() if digest}
+    kept_truth = {name: digest for name, digest in kept_private.items() if digest}
+    copied = {*kept_files, *(f"{contents.GROUND_TRUTH}/{name}" for name in kept_truth)}
+    # A file of which a good copy is here is not lost.
+    known_lost = losses.acknowledged() - copied
     return Contents(
         format=contents.FORMAT,
         made_at=now.isoformat(),
@@ -109,12 +117,13 @@ def _saved(folder: Path, rows: Path, former: Contents | None, *, now: datetime) 
         migrations=migrations,
         database=f"{rows.name}/{saved.name}",
         database_sha256=contents.digest_at(saved),
-        files={name: digest for name, digest in kept.items() if digest},
-        ground_truth={name: digest for name, digest in kept_private.items() if digest},
-        faults=faults,
+        files=kept_files,
+        ground_truth=kept_truth,
+        faults={name: fault for name, fault in faults.items() if name not in known_lost},
         keys=receipts.known_public_keys(),
         boards=boards,
         audit=tip,
+        known_lost={name: fault for name, fault in faults.items() if name in known_lost},
     )
 
 

@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import IO, Any, Final
 
@@ -62,6 +62,9 @@ class Contents:
     keys: dict[str, Any]
     boards: dict[str, str]
     audit: str
+    known_lost: dict[str, str] = field(
+        default_factory=dict
+    )  # as `faults`, but a maintainer has acknowledged it
 
     def write(self, folder: Path) -> None:
         with files.replacing(folder / LIST) as path:

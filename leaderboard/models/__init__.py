@@ -1,7 +1,7 @@
 """The tables. Constraints live here; the functions that change rows live in the rooms."""
 
 from leaderboard.models.audit import AuditEvent, AuditText
-from leaderboard.models.backups import BackupRun
+from leaderboard.models.backups import BackupRun, LostFile
 from leaderboard.models.benchmark import (
     Edition,
     GroundTruth,

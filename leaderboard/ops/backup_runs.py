@@ -23,13 +23,21 @@ def begin(now: datetime) -> BackupRun:
 
 
 def finish(
-    run: BackupRun, *, now: datetime, is_ok: bool, n_files: int = 0, n_damaged: int = 0, fault: str = ""
+    run: BackupRun,
+    *,
+    now: datetime,
+    is_ok: bool,
+    n_files: int = 0,
+    n_damaged: int = 0,
+    n_lost: int = 0,
+    fault: str = "",
 ) -> None:
     """Record how a backup ended. Raises the database's error."""
     run.finished_at = now
     run.is_ok = is_ok
     run.n_files = n_files
     run.n_damaged = n_damaged
+    run.n_lost = n_lost
     run.fault = fault[:_MAX_CHARACTERS]
     run.save()
 

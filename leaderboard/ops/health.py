@@ -22,7 +22,7 @@ from django.utils import timezone
 from kombu import Connection
 from kombu.exceptions import KombuError
 
-from leaderboard.models import AuditEvent, Installation, Mail, SweepBeat
+from leaderboard.models import AuditEvent, Evaluation, Installation, Mail, Status, SweepBeat
 from leaderboard.ops import backup_runs, faults
 
 log = structlog.get_logger(__name__)
@@ -34,6 +34,11 @@ MAX_UNSEALED_AGE_S = 120.0
 MAX_MAIL_AGE: Final = timedelta(hours=1)
 # An upload that the site refused is of interest until one is accepted, or until nobody has tried for so long.
 MAX_REFUSAL_AGE: Final = timedelta(hours=1)
+# A submission that waits so long, and files that nobody has looked through for so long, need a person.
+MAX_QUEUE_AGE: Final = timedelta(minutes=10)
+MAX_CLEAN_AGE: Final = timedelta(days=1)
+# So many refused mails in a day are some mistyped addresses; more, and most of all, are a fault.
+MAX_REFUSED_MAILS: Final = 5
 # Room for so many of the largest prediction files; at 20 files a day some days.
 MIN_FREE_FILES: Final = 100
 PROBE = "probe"
@@ -126,7 +131,10 @@ def _database() -> tuple[Check, ...]:
     )
 
 
-LASTING: Final = ("file store", "free space", "uploads", "statistics", "backup", "mail")
+LASTING: Final = (
+    *("file store", "free space", "uploads", "statistics", "backup", "mail"),
+    *("refused mails", "queue", "system errors", "cleaning"),
+)
 
 
 def _lasting(*, now: datetime, using: str) -> tuple[Check, ...]:
@@ -149,12 +157,52 @@ def _lasting(*, now: datetime, using: str) -> tuple[Check, ...]:
             is_ok=not failing_statistics(now=now, using=using),
             fault="intervals, comparisons or analyses fail again and again",
         ),
+        _backup(now=now, using=using),
         _well(
-            "backup",
-            is_ok=not backup_runs.is_overdue(now=now, using=using),
-            fault="the last good backup is old",
+            "mail",
+            is_ok=not mails_wait(now=now, using=using),
+            fault="mails wait for the mail server, or it takes none",
         ),
-        _well("mail", is_ok=not mails_wait(now=now, using=using), fault="a mail waits for the mail server"),
+        _well(
+            "refused mails",
+            is_ok=not mails_are_refused(now=now, using=using),
+            fault="the mail server refuses most mails",
+            is_vital=False,
+        ),
+        *_work(now=now, using=using),
+    )
+
+
+def _backup(*, now: datetime, using: str) -> Check:
+    if backup_runs.is_overdue(now=now, using=using):
+        return Check("backup", is_ok=False, detail="the last good backup is old")
+    has_failed = backup_runs.failed_since_good(now=now, using=using).exists()
+    return _well("backup", is_ok=not has_failed, fault="the last backup is not good", is_vital=False)
+
+
+def _work(*, now: datetime, using: str) -> tuple[Check, ...]:
+    """Check what workers have to do, or could not do."""
+    evaluations = Evaluation.objects.using(using)
+    waiting = evaluations.filter(status=Status.QUEUED, queued_at__lt=now - MAX_QUEUE_AGE)
+    return (
+        _well(
+            "queue",
+            is_ok=not waiting.exists(),
+            fault="a submission waits for over ten minutes",
+            is_vital=False,
+        ),
+        _well(
+            "system errors",
+            is_ok=not evaluations.filter(status=Status.SYSTEM_ERROR).exists(),
+            fault="an evaluation that failed waits for a retry by a maintainer",
+            is_vital=False,
+        ),
+        _well(
+            "cleaning",
+            is_ok=is_cleaned(now=now, using=using),
+            fault="unused files are not removed",
+            is_vital=False,
+        ),
     )
 
 
@@ -197,12 +245,28 @@ def mails_wait(*, now: datetime, using: str = "default") -> bool:
     """Say whether mails wait longer than `MAX_MAIL_AGE` for the mail server, which is away or refuses all."""
     if not settings.SENDS_MAIL:
         return False
-    old = Mail.objects.using(using).filter(ended_at=None, queued_at__lt=now - MAX_MAIL_AGE)
+    long_ago = now - MAX_MAIL_AGE
+    waiting = Mail.objects.using(using).filter(ended_at=None)
     # One that the server does not take has a reason of its own, which may be the reason of all.
-    takes_nothing = faults.present([faults.MAIL], now=now, using=using)
-    return old.filter(reason="").exists() or (
-        old.exists() and takes_nothing.filter(began_at__lt=now - MAX_MAIL_AGE).exists()
+    takes_nothing = faults.present([faults.MAIL], now=now, using=using).filter(began_at__lt=long_ago)
+    return waiting.filter(reason="", queued_at__lt=long_ago).exists() or (
+        waiting.exists() and takes_nothing.exists()
     )
+
+
+def mails_are_refused(*, now: datetime, using: str = "default") -> bool:
+    """Say whether more mails were refused or given up in the last day than sent, and more than a few."""
+    ended = Mail.objects.using(using).filter(ended_at__gte=now - timedelta(days=1))
+    n_sent = ended.filter(is_sent=True).count()
+    return ended.filter(is_sent=False).count() > max(n_sent, MAX_REFUSED_MAILS)
+
+
+def is_cleaned(*, now: datetime, using: str = "default") -> bool:
+    """Say whether a worker has looked for unused files within `MAX_CLEAN_AGE`; True before the first try."""
+    beat = SweepBeat.objects.using(using).first()
+    if beat is None or beat.cleaned_at is None:
+        return beat is None or beat.clean_begun_at is None
+    return beat.cleaned_at >= now - MAX_CLEAN_AGE
 
 
 def _ground_truth(n_without: int) -> Check:

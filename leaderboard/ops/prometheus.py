@@ -203,6 +203,11 @@ def _backups(*, now: datetime) -> Iterator[Metric]:
         "Backups since the last good one that were not good.",
         {(): backup_runs.failed_since_good(now=now).count()},
     )
+    yield _gauge(
+        "tsttc_backup_files_lost",
+        "Files that the last good backup lacks since they are lost for good, as a maintainer has said.",
+        {(): good.n_lost if good else 0},
+    )
 
 
 # --- Prometheus' words ----------------------------------------------------------------------------------

@@ -35,8 +35,14 @@ class Command(BaseCommand):
                 f"{receipts.PUBLIC_KEY} is not set, so the backup has no public key of receipts. "
                 "`check --deploy` of the web process prints its value."
             )
+        if made.known_lost:
+            self.stdout.write(
+                f"{counted(len(made.known_lost), 'file')} known to be lost for good:\n"
+                + contents.listed_faults(made.known_lost)
+            )
         if made.faults:
             raise CommandError(
                 "The backup is there, with the whole database, but these files are lost, damaged or "
-                f"unreadable ({len(made.faults):,}):\n{contents.listed_faults(made.faults)}"
+                f"unreadable ({len(made.faults):,}):\n{contents.listed_faults(made.faults)}\n"
+                "Copy good ones back, or say with acknowledge_loss that they are lost for good."
             )

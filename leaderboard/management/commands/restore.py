@@ -38,10 +38,10 @@ class Command(BaseCommand):
             self.stdout.write(
                 "Boards are compared only with the version that made the backup; this one is later."
             )
-        if kept.faults:
+        if kept.faults or kept.known_lost:
             self.stdout.write(
                 "When it was made, these files of the site were lost, damaged or unreadable:\n"
-                + contents.listed_faults(kept.faults)
+                + contents.listed_faults({**kept.faults, **kept.known_lost})
             )
         for key in done.keys_away:
             self.stdout.write(

@@ -57,7 +57,9 @@ _VERBS: Final = {
 }
 _NOUNS: Final = {
     "ApiToken": "API token",
+    "FileStore": "File store",
     "GroundTruth": "Ground truth",
+    "LostFile": "Lost file",
     "PublishedResult": "Published result",
     "SiteAnnouncement": "Announcement of the site",
     "User": "Person",

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterable, Mapping
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Any, Final, NamedTuple
 
 from django.core.paginator import Paginator
@@ -41,8 +41,13 @@ def totals(*, split: str = "") -> dict[str, Any]:
     by_status = {status: (n, oldest_at) for status, n, oldest_at in rows}
     counts = {name: by_status.get(state.status, (0, None))[0] for name, state in STATES.items()}
     _, oldest_at = by_status.get(Status.QUEUED, (0, None))
-    age = duration((clock.database_now() - oldest_at).total_seconds()) if oldest_at else ""
-    return {"counts": counts, "n": sum(counts.values()), "oldest_age": age}
+    age = clock.database_now() - oldest_at if oldest_at else timedelta()
+    return {
+        "counts": counts,
+        "n": sum(counts.values()),
+        "oldest_age": duration(age.total_seconds()) if oldest_at else "",
+        "is_slow": age > health.MAX_QUEUE_AGE,
+    }
 
 
 def queue_table(*, state: str = "", split: str = "", number: Any = 1) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The state of the site for its operator: workers, file store, uploads, statistics, backups and mails."""
+"""The state of the site for its operator: what `/healthy` names, with numbers and reasons."""
 
 from collections.abc import Iterator
 from datetime import datetime
@@ -8,7 +8,7 @@ from django.conf import settings
 
 from evaluator.counting import counted
 from leaderboard.mails import outbox
-from leaderboard.models import Fault, Mail, SweepBeat
+from leaderboard.models import AuditEvent, Fault, Installation, Mail, SweepBeat
 from leaderboard.ops import backup_runs, faults, health
 from leaderboard.web.formatting import duration
 
@@ -28,11 +28,15 @@ def lines(*, now: datetime) -> list[Line]:
     """Return the state of each thing."""
     return [
         _workers(),
+        _broker(),
+        _ground_truth(),
         _store(now=now),
+        _unused_files(now=now),
         _uploads(now=now),
         _statistics(now=now),
         _backups(now=now),
         _mails(now=now),
+        _audit_log(),
     ]
 
 
@@ -47,6 +51,20 @@ def _workers() -> Line:
     return Line("Workers", f"last seen {duration(age_s)} ago", is_bad=age_s > health.MAX_SWEEP_AGE_S)
 
 
+def _broker() -> Line:
+    if health.broker().is_ok:
+        return Line("Broker", "answers")
+    return Line("Broker", "does not answer: files are scored some seconds later", is_bad=True)
+
+
+def _ground_truth() -> Line:
+    n_waiting = health.n_out_of_reach()
+    if not n_waiting:
+        return Line("Ground truth", "workers can read it for all files that wait")
+    waiting = counted(n_waiting, "file waits", "files wait")
+    return Line("Ground truth", f"no worker can read it: {waiting}", is_bad=True)
+
+
 def _store(*, now: datetime) -> Line:
     fault = faults.present([faults.STORE], now=now).first()
     if fault is not None:
@@ -59,6 +77,19 @@ def _store(*, now: datetime) -> Line:
         return Line("File store", checked)
     room = f"room for {beat.store_free_bytes / _GB:,.1f} GB"
     return Line("File store", f"{checked}, {room}", is_bad=not health.has_room(beat.store_free_bytes))
+
+
+def _unused_files(*, now: datetime) -> Line:
+    owner = Installation.objects.values_list("store_is_of", flat=True).first()
+    if owner:
+        text = (
+            f"stay, since the file store belongs to another site ({owner}); claim_store makes it this site’s"
+        )
+        return Line("Unused files", text, is_bad=True)
+    beat = SweepBeat.objects.first()
+    cleaned_at = beat.cleaned_at if beat else None
+    text = f"last looked for {_ago(cleaned_at, now=now)}" if cleaned_at else "not looked for yet"
+    return Line("Unused files", text, is_bad=not health.is_cleaned(now=now))
 
 
 def _uploads(*, now: datetime) -> Line:
@@ -94,6 +125,8 @@ def _backups(*, now: datetime) -> Line:
         text = (
             f"the last good one ended {_ago(good.finished_at, now=now)}, with {counted(good.n_files, 'file')}"
         )
+        if good.n_lost:
+            text += f", without {counted(good.n_lost, 'file')} known to be lost"
     failed = backup_runs.failed_since_good(now=now)
     n_failed = failed.count()
     if good is None and not n_failed:
@@ -112,7 +145,7 @@ def _mails(*, now: datetime) -> Line:
     text = "".join(_mail_parts(now=now))
     fault = faults.present([faults.MAIL], now=now).first()
     if fault is None or not outbox.waiting():
-        return Line("Emails", text, is_bad=health.mails_wait(now=now))
+        return Line("Emails", text, health.mails_wait(now=now) or health.mails_are_refused(now=now))
     reason = f"{_lasting('the mail server takes none', fault, now=now)}: {fault.reason}"
     return Line("Emails", text, True, (reason,))
 
@@ -122,3 +155,14 @@ def _mail_parts(*, now: datetime) -> Iterator[str]:
     oldest = Mail.objects.filter(ended_at=None, reason="").order_by("queued_at").first()
     if oldest is not None:
         yield f", the oldest for {duration((now - oldest.queued_at).total_seconds())}"
+    if health.mails_are_refused(now=now):
+        yield "; the mail server refused most of the last day"
+
+
+def _audit_log() -> Line:
+    unsealed = AuditEvent.objects.unsealed()
+    if not unsealed.n_events:
+        return Line("Audit log", "sealed")
+    age = duration(unsealed.oldest_age_s)
+    text = f"{counted(unsealed.n_events, 'event')} not sealed yet, the oldest for {age}"
+    return Line("Audit log", text, is_bad=unsealed.oldest_age_s >= health.MAX_UNSEALED_AGE_S)

@@ -8,14 +8,16 @@ from pathlib import Path
 import pytest
 from django.conf import settings as configured
 from django.core.management import CommandError, call_command
+from django.test import Client
 from django.utils import timezone
 
 from leaderboard.backups import backup, contents, copies
 from leaderboard.backups.contents import Contents, NoBackup
-from leaderboard.models import BackupRun, Edition, Submission, User
+from leaderboard.models import AuditEvent, BackupRun, Edition, LostFile, Submission, User
 from leaderboard.ops import backup_runs
 from leaderboard.storage import files, hidden_marks, seeds, truth_values
 from tests import builders
+from tests.leaderboard.ops.test_prometheus import figures
 
 pytestmark = [pytest.mark.slow, pytest.mark.django_db(transaction=True)]
 
@@ -279,3 +281,105 @@ def test_a_list_of_the_former_form_is_read(sent: list[Submission], folder: Path)
     (folder / contents.LIST).write_text(former)
     assert Contents.read(folder).faults == {"manifests/ab.csv": "is missing on the site"}
     assert make(folder).faults == {}
+
+
+def acknowledge(*names: str) -> None:
+    call_command("acknowledge_loss", *names, "--reason", "the disk is gone")
+
+
+def name_of(submission: Submission) -> str:
+    return files.predictions_name(submission.digest)
+
+
+@pytest.mark.parametrize("harm", HARM)
+def test_of_two_lost_files_the_acknowledged_one_is_no_fault_any_more(
+    sent: list[Submission], folder: Path, harm: str
+) -> None:
+    first, second = map(name_of, sent)
+    for submission in sent:
+        HARM[harm][0](stored(submission))
+    assert set(make(folder).faults) == {first, second}
+    acknowledge(first)
+    made = make(folder)
+    assert (set(made.faults), set(made.known_lost)) == ({second}, {first})
+    assert backup_runs.last_good() is None
+    acknowledge(second)
+    made = make(folder)
+    assert (made.faults, set(made.known_lost)) == ({}, {first, second})
+    good = backup_runs.last_good()
+    assert good is not None
+    assert (good.n_lost, good.n_damaged) == (2, 0)
+    assert not backup_runs.failed_since_good(now=timezone.now()).exists()
+    assert Contents.read(folder).known_lost == made.known_lost
+
+
+def test_what_is_lost_of_the_ground_truth_is_acknowledged_as_well(edition: Edition, folder: Path) -> None:
+    values, manifest = (private(edition)[kind] for kind in ("values", "manifest"))
+    for path in (values, manifest):
+        path.unlink()
+    acknowledge(f"ground-truth/{values.name}")
+    made = make(folder)
+    assert list(made.known_lost) == [f"ground-truth/{values.name}"]
+    assert list(made.faults) == [f"ground-truth/{manifest.name}"]
+
+
+def test_an_acknowledged_file_that_came_back_is_saved_and_its_next_loss_is_a_fault(
+    sent: list[Submission], folder: Path
+) -> None:
+    content = [stored(submission).read_bytes() for submission in sent]
+    for submission in sent:
+        stored(submission).unlink()
+    acknowledge(*map(name_of, sent))
+    assert make(folder).faults == {}
+    stored(sent[0]).write_bytes(content[0])
+    made = make(folder)
+    assert name_of(sent[0]) in made.files
+    assert list(made.known_lost) == [name_of(sent[1])]
+    stored(sent[0]).unlink()
+    assert list(make(folder).faults) == [name_of(sent[0])]
+
+
+def test_a_file_of_which_the_backup_has_a_good_copy_stays_a_fault(
+    sent: list[Submission], folder: Path
+) -> None:
+    make(folder)
+    stored(sent[0]).unlink()
+    acknowledge(name_of(sent[0]))
+    made = make(folder)
+    assert made.known_lost == {}
+    assert made.faults[name_of(sent[0])].endswith("the backup keeps its good copy")
+
+
+def test_only_a_needed_file_that_is_lost_is_acknowledged_and_of_two_names_none_if_one_is_refused(
+    sent: list[Submission],
+) -> None:
+    stored(sent[0]).unlink()
+    for other, sentence in {
+        name_of(sent[1]): "is there and undamaged",
+        "predictions/ab/none.json": "The site needs no file",
+        "../../etc/passwd": "The site needs no file",
+    }.items():
+        with pytest.raises(CommandError, match=sentence):
+            acknowledge(name_of(sent[0]), other)
+    seeds.path().unlink()
+    with pytest.raises(CommandError, match="make_seed_key"):
+        acknowledge("ground-truth/seed.key")
+    assert not LostFile.objects.exists()
+    acknowledge(name_of(sent[0]))
+    event = AuditEvent.objects.get(noun="LostFile")
+    assert event.details["file"] == name_of(sent[0])
+    assert event.details["reason"] == "the disk is gone"
+
+
+def test_the_command_and_the_pages_say_how_many_files_are_known_to_be_lost(
+    sent: list[Submission], folder: Path, keeper: Client, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for submission in sent:
+        stored(submission).unlink()
+    acknowledge(*map(name_of, sent))
+    call_command("backup", str(folder))
+    out = capsys.readouterr().out
+    assert "2 files known to be lost for good" in out
+    assert name_of(sent[0]) in out
+    assert "without 2 files known to be lost" in keeper.get("/maintain/").text
+    assert figures()["tsttc_backup_files_lost"] == 2

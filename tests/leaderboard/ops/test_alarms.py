@@ -38,6 +38,7 @@ from leaderboard.upkeep import pollers, store_check
 from tests import builders
 from tests.leaderboard.ops.test_health import write_event
 from tests.leaderboard.web.maintain import queue_rows
+from tests.pages import get
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 [GROUP] = yaml.safe_load((REPOSITORY / "deploy/prometheus/rules.yml").read_text())["groups"]
@@ -283,6 +284,27 @@ FAULTS: list[tuple[str, Callable[[World], None]]] = [
     ("TsttcNobodyCleans", _nobody_cleans),
 ]
 
+# What each fault is called at /healthy, and on the maintainers' page.
+NAMES: dict[str, tuple[str, str]] = {
+    "TsttcNobodySweeps": ("sweep", "Workers"),
+    "TsttcQueueWaits": ("queue", "Queue"),
+    "TsttcSystemErrors": ("system errors", "Queue"),
+    "TsttcUploadsRefused": ("uploads", "Uploads"),
+    "TsttcStoreFails": ("file store", "File store"),
+    "TsttcStoreFull": ("free space", "File store"),
+    "TsttcStatisticsFail": ("statistics", "Statistics"),
+    "TsttcBackupFails": ("backup", "Backups"),
+    "TsttcBackupOld": ("backup", "Backups"),
+    "TsttcBrokerDown": ("broker", "Broker"),
+    "TsttcMailsWait": ("mail", "Emails"),
+    "TsttcMailServerFails": ("mail", "Emails"),
+    "TsttcMailsRefused": ("refused mails", "Emails"),
+    "TsttcAuditUnsealed": ("audit log", "Audit log"),
+    "TsttcNobodyCleans": ("cleaning", "Unused files"),
+}
+# The first is the page's own database; the others are figures of processes, or of minutes.
+WITHOUT_NAME = {"TsttcDown", "TsttcInfrastructureStrikes", "TsttcServerErrors", "TsttcSlow"}
+
 
 @pytest.fixture
 def world(
@@ -302,7 +324,7 @@ def world(
 
 
 def test_every_alarm_has_a_fault_that_is_brought_about() -> None:
-    assert {alert for alert, _ in FAULTS} == set(RULES)
+    assert {alert for alert, _ in FAULTS} == set(RULES) == NAMES.keys() | WITHOUT_NAME
 
 
 def test_no_alarm_fires_on_a_site_on_which_all_is_well(world: World) -> None:
@@ -318,3 +340,32 @@ def test_the_alarm_fires_once_its_fault_is_there(
     assert not fires(RULES[alert], before=before, now=before)
     spoil(world)
     assert fires(RULES[alert], before=before, now=scrape())
+
+
+@pytest.mark.django_db(transaction=True)
+@pytest.mark.parametrize(
+    ("alert", "spoil"),
+    [(alert, spoil) for alert, spoil in FAULTS if alert in NAMES],
+    ids=lambda each: getattr(each, "__name__", each),
+)
+def test_the_fault_of_an_alarm_is_named_by_health_and_on_the_maintainers_page(
+    world: World, keeper: Client, alert: str, spoil: Callable[[World], None]
+) -> None:
+    kind, line = NAMES[alert]
+    assert _unwell() == set()
+    assert not _bad_lines(keeper)
+    spoil(world)
+    assert kind in _unwell()
+    assert line in _bad_lines(keeper)
+
+
+def _unwell() -> set[str]:
+    return {check.name for check in health.checks() if not check.is_ok}
+
+
+def _bad_lines(keeper: Client) -> set[str]:
+    root = get(keeper, "/maintain/")
+    tiles = {tile.one("a").text for tile in root.all("li", class_="bad")}
+    listed = next(each for each in root.all("dl") if "Workers" in each.text)
+    pairs = zip(listed.all("dt"), listed.all("dd"), strict=True)
+    return tiles | {name.text for name, text in pairs if "bad" in text.classes}

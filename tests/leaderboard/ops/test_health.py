@@ -69,6 +69,10 @@ def test_ready_when_database_broker_and_sweep_are_well() -> None:
         "statistics": True,
         "backup": True,
         "mail": True,
+        "refused mails": True,
+        "queue": True,
+        "system errors": True,
+        "cleaning": True,
         "broker": True,
     }
 

@@ -7,7 +7,7 @@ from django.test import Client
 from django.utils import timezone
 from pytest_django import Settings
 
-from leaderboard.models import Mail, MailKind, SweepBeat
+from leaderboard.models import Installation, Mail, MailKind, SweepBeat
 from leaderboard.ops import backup_runs, faults
 from leaderboard.upkeep import pollers, store_check
 from tests.pages import get
@@ -30,7 +30,10 @@ def test_a_site_on_which_all_is_well_has_no_bad_line(keeper: Client, settings: S
     pollers.sweep(rng=random.Random(0))
     store_check.check(now=timezone.now())
     shown = state(keeper)
-    assert list(shown) == ["Workers", "File store", "Uploads", "Statistics", "Backups", "Emails"]
+    assert list(shown) == [
+        *("Workers", "Broker", "Ground truth", "File store", "Unused files", "Uploads"),
+        *("Statistics", "Backups", "Emails", "Audit log"),
+    ]
     assert not [name for name, (_, is_bad) in shown.items() if is_bad]
     run = backup_runs.begin(timezone.now() - 6 * HOUR)
     backup_runs.finish(run, now=timezone.now() - 5 * HOUR, is_ok=True, n_files=1768)
@@ -52,7 +55,8 @@ def test_each_fault_is_marked_and_has_its_reason(keeper: Client, settings: Setti
         backup_runs.finish(run, now=now - hours * HOUR, is_ok=False, fault="predictions/ab.json is damaged")
     Mail.objects.create(kind=MailKind.ACCOUNT, recipient="a@example.org", queued_at=now - 3 * HOUR)
     shown = state(keeper)
-    assert all(is_bad for _, is_bad in shown.values()), shown
+    bad = {name for name, (_, is_bad) in shown.items() if is_bad}
+    assert bad == {"Workers", "File store", "Uploads", "Statistics", "Backups", "Emails"}
     assert "no worker" in shown["Workers"][0]
     assert "read-only" in shown["File store"][0]
     assert "1 upload refused because of an error of the site" in shown["Uploads"][0]
@@ -69,4 +73,19 @@ def test_little_room_is_marked(keeper: Client) -> None:
     SweepBeat.objects.update(store_checked_at=timezone.now(), store_free_bytes=10**9)
     text, is_bad = state(keeper)["File store"]
     assert text.endswith("room for 1.0 GB")
+    assert is_bad
+
+
+def test_ground_truth_broker_and_a_store_of_another_site_have_their_numbers(
+    keeper: Client, settings: Settings
+) -> None:
+    pollers.sweep(rng=random.Random(0))
+    SweepBeat.objects.update(n_out_of_reach=2, clean_begun_at=timezone.now())
+    Installation.objects.create(store_is_of="another-site")
+    settings.CELERY_BROKER_URL = "redis://127.0.0.1:1/0"
+    shown = state(keeper)
+    assert shown["Broker"] == ("does not answer: files are scored some seconds later", True)
+    assert shown["Ground truth"] == ("no worker can read it: 2 files wait", True)
+    text, is_bad = shown["Unused files"]
+    assert "belongs to another site (another-site)" in text
     assert is_bad
