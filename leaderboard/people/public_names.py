@@ -1,10 +1,12 @@
 """Names that everybody sees: public methods and rows of papers. No two of them look alike."""
 
+from typing import NamedTuple
+
 from django.db import IntegrityError, transaction
 from django.db.models import Q
 
 from leaderboard.errors.refusals import Refused
-from leaderboard.models import Method, PublishedResult, Visibility
+from leaderboard.models import Method, PublishedResult, Team, Visibility
 from leaderboard.people.names import confusable_with, skeleton
 
 
@@ -39,6 +41,27 @@ def save(method: Method, *, fields: list[str]) -> None:
             method.save(update_fields=[*fields, "look"])
     except IntegrityError:
         raise _taken(method.name, method.name, field="visibility") from None
+
+
+class Exempt(NamedTuple):
+    """A public name from before looks were compared, and the one that it looks like, if it is still there."""
+
+    row: Team | Method
+    twin: str | None
+
+
+def exempt() -> list[Exempt]:
+    """Return the names that keep their look until they are renamed: teams, then methods, by name."""
+    teams = Team.objects.filter(is_shown=True)
+    methods = Method.objects.filter(visibility=Visibility.PUBLIC).select_related("team")
+    found = []
+    for rows in (teams, methods):
+        # Only such a look has a space, before the number of its row.
+        for row in rows.filter(look__contains=" ").order_by("name", "pk"):
+            look = skeleton(row.name)
+            others = rows.filter(Q(look=look) | Q(look__startswith=f"{look} ")).exclude(pk=row.pk)
+            found.append(Exempt(row, others.order_by("look").values_list("name", flat=True).first()))
+    return found
 
 
 def _taken(name: str, twin: str, *, field: str) -> Refused:

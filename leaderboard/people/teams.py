@@ -7,6 +7,7 @@ import secrets
 from datetime import datetime
 
 from django.db import IntegrityError, transaction
+from django.db.models import Q
 from django.db.models.functions import Now
 
 from leaderboard import audit, board_versions
@@ -246,8 +247,9 @@ def _taken_first(name: str) -> Refused:
 
 
 def _public_twin(name: str, *, but: Team | None = None) -> bool:
-    # Only public teams take a name.
-    shown = Team.objects.filter(look=skeleton(name), is_shown=True)
+    # Only public teams take a name. One from before looks were compared has its number after its look.
+    look = skeleton(name)
+    shown = Team.objects.filter(Q(look=look) | Q(look__startswith=f"{look} "), is_shown=True)
     return (shown.exclude(pk=but.pk) if but is not None else shown).exists()
 
 

@@ -10,7 +10,7 @@ from django.views.decorators.http import require_safe
 
 from leaderboard.models import OldAddress, Team, User
 from leaderboard.moderation import forgetting, takeovers
-from leaderboard.people import names
+from leaderboard.people import names, public_names
 from leaderboard.quotas import mailboxes
 from leaderboard.quotas.spans import span
 from leaderboard.web.forms import SiteForm
@@ -37,6 +37,7 @@ def team_list(request: HttpRequest) -> HttpResponse:
     if not text and page.number == 1:
         context["domains"] = mailboxes.busiest_domains(now=timezone.now())
         context["window"] = span(mailboxes.longest_window())
+        context["alike"] = public_names.exempt()
         context["old_addresses"] = OldAddress.objects.order_by("mailbox", "address")
     return render(request, "maintain/teams.html", context, status=400 if form.errors else 200)
 
