@@ -11,7 +11,7 @@ from rest_framework import exceptions
 from rest_framework.parsers import DataAndFiles, JSONParser, MultiPartParser
 from rest_framework.renderers import JSONRenderer
 
-from leaderboard.errors.refusals import Refused
+from leaderboard.errors.refusals import doubled_field
 
 MAX_BYTES: Final = 100_000
 """All details of a method take a third of it, even with every character escaped."""
@@ -53,13 +53,8 @@ def _require_once(pairs: list[tuple[str, Any]]) -> None:
     seen = set[str]()
     for name, _ in pairs:
         if name in seen:
-            raise _doubled(name, n_given=sum(name == other for other, _ in pairs))
+            raise doubled_field(name, n_given=sum(name == other for other, _ in pairs))
         seen.add(name)
-
-
-def _doubled(name: str, *, n_given: int) -> Refused:
-    sentence = f"The request has the field {name[:60]!r} {n_given} times; expected it once."
-    return Refused("doubled-field", sentence, field=name[:60])
 
 
 class _Body:
@@ -104,7 +99,7 @@ class SingleMultiPartParser(MultiPartParser):
             n_given = len(parsed.data.getlist(name)) + len(parsed.files.getlist(name))
             if n_given > 1:
                 _close_files(parsed)
-                raise _doubled(name, n_given=n_given)
+                raise doubled_field(name, n_given=n_given)
         return parsed
 
 

@@ -24,6 +24,13 @@ class Refused(Exception):
         self.advice = advice
 
 
+def doubled_field(name: str, *, n_given: int) -> Refused:
+    """Make the refusal of a request that gives a field more than once: only one of them would count."""
+    name = name[:60]
+    sentence = f"The request has the field {name!r} {n_given} times; expected it once."
+    return Refused("doubled-field", sentence, field=name)
+
+
 class NotMaintainer(Exception):
     """The actor is no maintainer."""
 

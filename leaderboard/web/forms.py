@@ -7,10 +7,12 @@ from urllib.parse import urlencode
 
 from django import forms
 from django.http import HttpRequest
+from django.utils.datastructures import MultiValueDict
 
-from leaderboard.errors.refusals import Refused
+from leaderboard.errors.refusals import Refused, doubled_field
 
 _ADDRESS: Final = {"placeholder": "https://", "maxlength": 500}
+_OF_MANY: Final = (forms.MultipleChoiceField, forms.ModelMultipleChoiceField)
 
 
 class SiteForm(forms.Form):
@@ -21,15 +23,28 @@ class SiteForm(forms.Form):
         """Return the form with a request's data, or with its initial values."""
         return cls(request.POST if request.method == "POST" else None, **options)
 
+    def full_clean(self) -> None:
+        """Check the fields; refuse one that comes twice, of which Django keeps the last."""
+        super().full_clean()
+        if not self.is_bound:
+            return
+        for name, field in self.fields.items():
+            n_given = sum(len(sent.getlist(self.add_prefix(name))) for sent in self._sent())
+            if n_given > 1 and not isinstance(field, _OF_MANY):
+                self.refuse(doubled_field(name, n_given=n_given))
+
+    def _sent(self) -> list[MultiValueDict[str, Any]]:
+        return [sent for sent in (self.data, self.files) if isinstance(sent, MultiValueDict)]
+
     @property
     def ignored(self) -> list[str]:
         """Return the parameters of an address that are no field of the form, but for the number of a page."""
         return [name for name in self.data if name not in self.fields and name != "page"]
 
     def refuse(self, refusal: Exception) -> None:
-        """Put the advice, or else the message, at the field at fault."""
+        """Put the advice, or else the message, at the field at fault; above all for a hidden one."""
         field = getattr(refusal, "field", "")
-        if field in self.fields:
+        if field in self.fields and not self.fields[field].widget.is_hidden:
             self.add_error(field, getattr(refusal, "advice", "") or str(refusal))
         else:
             self.add_error(None, str(refusal))

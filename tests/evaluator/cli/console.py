@@ -216,6 +216,8 @@ def put_more_documented_answers(site: RecordedSite) -> None:
     pair = {"differences": differences, "sentence": sentence}
     site.put("GET /api/v1/compare", Reply(compared | {"pairs": [pair]}))
     site.put(f"GET /api/v1/submissions/{ID}/receipt", Reply(RECEIPT.encode()))
+    moved = {"id": ID, "state": "SCORED", "split": "test", "method": "Foo++"}
+    site.put(f"POST /api/v1/submissions/{ID}/move", Reply(moved))
     site.put("GET /api/v1/methods", Reply([]))
 
 

@@ -84,6 +84,37 @@ def test_withdraw_asks_first_and_says_what_became_of_it(tsttc: Tsttc, site: Reco
     assert (done.exit_code, done.stdout) == (0, "Foo++ on val is cancelled.\n")
 
 
+def test_move_sends_the_method_and_says_where_the_submission_is_now(
+    tsttc: Tsttc, site: RecordedSite
+) -> None:
+    moved = SUBMISSIONS[0] | {"method": "Right net"}
+    site.put(f"POST /api/v1/submissions/{ID}/move", Reply(moved))
+    result = tsttc("move", ID, "--method", "Right net")
+    assert (result.exit_code, result.stdout) == (0, "The submission to val is now one of Right net.\n")
+    assert json.loads(tsttc("move", ID, "--method", METHOD_ID, "--json").stdout) == moved
+    assert [json.loads(post.body) for post in site.posts] == [{"method": "Right net"}, {"method": METHOD_ID}]
+
+
+@pytest.mark.parametrize(
+    ("code", "status", "detail", "exit_code"),
+    [
+        ("not-movable", 409, "The method 'Foo++' is public; expected a private one.", 8),
+        ("not-yours", 403, "Only the team that sent a submission can move it.", 4),
+        ("same-file", 409, "The method 'Bar' has the same file already; expected a method without it.", 8),
+        ("unknown-method", 422, "Your team has no method 'Bar'; expected the name or id of one.", 2),
+        ("not-found", 404, "No such submission.", 8),
+    ],
+)
+def test_move_that_is_refused_prints_the_server_s_sentence(
+    tsttc: Tsttc, site: RecordedSite, code: str, status: int, detail: str, exit_code: int
+) -> None:
+    site.put(f"POST /api/v1/submissions/{ID}/move", Reply(problem(detail, code=code, where="method"), status))
+    result = tsttc("move", ID, "--method", "Bar")
+    assert (result.exit_code, result.stdout) == (exit_code, "")
+    assert detail in result.stderr
+    assert tsttc("move", ID).exit_code == 2, "without a method"
+
+
 def test_download_gives_the_bytes_as_they_were_sent(tsttc: Tsttc, site: RecordedSite, tmp_path: Path) -> None:
     data = b'{"0": 1.0}\r\n'
     site.put(f"GET /api/v1/submissions/{ID}/file", Reply(data))

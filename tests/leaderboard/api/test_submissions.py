@@ -2,6 +2,7 @@
 
 import json
 from datetime import timedelta
+from pathlib import Path
 
 import pytest
 from django.core.files.uploadedfile import SimpleUploadedFile
@@ -139,6 +140,20 @@ def test_the_same_bytes_are_answered_with_the_first_submission_when_nothing_more
     )
     assert (page.status_code, page.headers["Location"]) == (302, f"/submissions/{first['id']}/")
     assert Submission.objects.count() == 1
+
+
+def test_a_closed_split_answers_only_the_team_and_method_that_sent_the_file_there(
+    edition: Edition, owner: User, stranger: User, tmp_path: Path
+) -> None:
+    builders.import_truth(tmp_path, split="val")
+    data, clients = builders.predictions(edition), [client_of(owner), client_of(stranger)]
+    first = post(clients[0], data).json()
+    on_val = post(clients[1], data, split="val").json()
+    Split.objects.update(closes_at=timezone.now() - timedelta(seconds=1))
+    again = [[post(client, data, split=split) for split in ("test", "val")] for client in clients]
+    assert [[answer.status_code for answer in row] for row in again] == [[200, 409], [409, 200]]
+    assert (again[0][0].json()["id"], again[1][1].json()["id"]) == (first["id"], on_val["id"])
+    assert Submission.objects.count() == 2
 
 
 @pytest.mark.parametrize("name", ["file", "split", "method", "note", "commit", "paper_url", "unknown"])

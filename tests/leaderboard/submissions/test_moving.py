@@ -1,6 +1,7 @@
 """A submission under the wrong method is moved by its team, while no other team sees it."""
 
 import json
+from pathlib import Path
 
 import pytest
 from django.test import Client
@@ -54,6 +55,58 @@ def test_a_moved_submission_keeps_its_slot_and_its_receipt(
     assert (event.details["from"], event.details["to"]) == (str(wrong.method_id), str(right.method_id))
     assert move(moved, "TTC-Former", owner).method == right.method
     assert AuditEvent.objects.filter(verb="moved").count() == 1, "it is there already"
+
+
+def test_a_move_touches_one_file_of_one_split_and_one_team(
+    edition: Edition, owner: User, stranger: User, tmp_path: Path
+) -> None:
+    val = builders.import_truth(tmp_path, split="val")
+    files = {
+        (user, split, name): builders.submit(
+            user,
+            builders.predictions(made, factor=factor),
+            split=split,
+            method=name,
+            visibility="PRIVATE",
+        )
+        for user in (owner, stranger)
+        for split, made in (("test", edition), ("val", val))
+        for name, factor in (("Wrong", 1.1), ("Right", 1.2))
+    }
+    moved = files.pop((owner, "val", "Wrong"))
+    move(moved, "Right", owner)
+    moved.refresh_from_db()
+    right = files[owner, "test", "Right"].method
+    assert (moved.method, moved.split_id) == (right, "val")
+    kept = {row.pk: (row.method_id, row.split_id, row.digest) for row in files.values()}
+    rows = Submission.objects.exclude(pk=moved.pk)
+    assert {row.pk: (row.method_id, row.split_id, row.digest) for row in rows} == kept
+    assert [event.noun_id for event in AuditEvent.objects.filter(verb="moved")] == [str(moved.pk)]
+
+
+def test_the_same_file_on_another_split_or_of_another_team_is_no_obstacle(
+    edition: Edition, owner: User, stranger: User, tmp_path: Path
+) -> None:
+    builders.import_truth(tmp_path, split="val")
+    data = builders.predictions(edition)
+    wrong = builders.submit(owner, data, method="Wrong", visibility="PRIVATE")
+    builders.submit(owner, data, split="val", method="Right", visibility="PRIVATE")
+    builders.submit(stranger, data, method="Right", visibility="PRIVATE")
+    assert move(wrong, "Right", owner).method.name == "Right"
+    assert move(wrong, "Wrong", owner).method.name == "Wrong"
+    builders.submit(owner, data, method="Right", visibility="PRIVATE")
+    assert refused(wrong, "Right", owner) == "same-file"
+
+
+def test_a_retry_under_the_former_name_is_a_new_submission_and_under_the_new_one_the_first(
+    edition: Edition, owner: User
+) -> None:
+    data = builders.predictions(edition)
+    wrong = builders.submit(owner, data, method="Wrong", visibility="PRIVATE")
+    sent(owner, edition, "Right", 1.2)
+    move(wrong, "Right", owner)
+    assert builders.send(owner, data, method="Right").submission == wrong
+    assert builders.send(owner, data, method="Wrong").is_new
 
 
 def test_a_submission_is_not_moved_onto_the_same_file(edition: Edition, owner: User) -> None:

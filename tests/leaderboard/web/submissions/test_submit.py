@@ -218,6 +218,22 @@ def test_announced_excess_is_answered_413_without_reading(
     assert "expected at most 1 kB" in pages.page(response).one("main").text
 
 
+@pytest.mark.parametrize("field", ["file", "split", "method", "note", "paper_url", "confirmed"])
+@pytest.mark.parametrize("kind", ["texts", "files", "both"])
+def test_a_field_that_comes_twice_is_refused_at_its_place_in_the_words_of_the_api(
+    signed_in: Client, edition: Edition, field: str, kind: str
+) -> None:
+    data = builders.predictions(edition)
+    first, second = (SimpleUploadedFile(name, data) for name in ("a.json", "b.json"))
+    twice = {"texts": ["test", "val"], "files": [first, second], "both": ["test", first]}[kind]
+    form = {**FIELDS, "file": SimpleUploadedFile("p.json", data), field: twice}
+    response = signed_in.post("/submit/", form)
+    assert response.status_code == 422
+    sentence = f"The request has the field '{field}' 2 times; expected it once."
+    assert sentence in pages.page(response).one("form", id="submit").text
+    assert not Submission.objects.exists()
+
+
 # --- asked first: a slot, or what goes public, does not come back -------------------------------------------
 
 
