@@ -17,7 +17,8 @@ Floats = NDArray[np.float64]
 def as_floats(values: Any) -> Floats:
     """Convert to float64 of the same shape; a tensor may have bfloat16, a gradient and any device.
 
-    Masked entries become NaN: there is no value. Raises `TypeError` for complex numbers, dates and durations.
+    Masked entries become NaN: there is no value. Raises `TypeError` for what is no real number: texts,
+    booleans, complex numbers, dates, durations.
     """
     if hasattr(values, "detach"):
         if "complex" in str(getattr(values, "dtype", "")):
@@ -25,12 +26,23 @@ def as_floats(values: Any) -> Floats:
         values = values.detach().cpu().double()  # on the CPU first: not every device has float64
     elif isinstance(values, list | tuple) and values and hasattr(values[0], "detach"):
         values = [as_floats(value) for value in values]
-    array = ma.asanyarray(values) if isinstance(values, ma.MaskedArray) else np.asarray(values)
-    if array.dtype.kind in "cmM":
+    array = ma.asanyarray(values) if isinstance(values, ma.MaskedArray) else _array(values)
+    if array.dtype.kind in "cmMbSUV":
         raise TypeError(f"The values are of type {array.dtype}; expected real numbers.")
     if isinstance(array, ma.MaskedArray):
         return np.asarray(ma.filled(array.astype(np.float64), np.nan))
-    return np.asarray(array, dtype=np.float64)
+    try:
+        return np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        type_name = type(values if array.ndim == 0 else array.flat[0]).__name__
+        raise TypeError(f"The values are of type {type_name}; expected real numbers of float64.") from None
+
+
+def _array(values: Any) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise ValueError("The values are lists of different lengths; expected numbers.") from None
 
 
 def whole_numbers(values: Any, *, name: str) -> NDArray[np.int64]:

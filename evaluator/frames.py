@@ -8,7 +8,8 @@ from typing import Any, Final
 import pandas as pd
 
 from evaluator.arguments import require
-from evaluator.predictions.headers import NATURAL_KEY, PREDICTED, RATES
+from evaluator.predictions import slips
+from evaluator.predictions.headers import NAMES, NATURAL_KEY, RATES
 from evaluator.predictions.loading import Predictions, read_predictions
 from evaluator.truth.csv_tables import require_one_column
 from evaluator.truth.ground_truth import Manifest
@@ -66,7 +67,7 @@ def predictions_from_frame(
 def _value_column(names: list[str]) -> str:
     # A frame of the ground truth, with the predictions beside it, has `ttc` too.
     values = [name for name in ("ttc_s", "ttc", RATIO) if name in names]
-    if not values or PREDICTED in names:
+    if not values or slips.predicted_among([name for name in names if name not in NAMES]):
         raise KeyError(
             f"The frame has the columns {', '.join(names)}; expected ttc_s, ttc or {RATIO}, or column= with "
             "the name of another one."

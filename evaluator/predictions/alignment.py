@@ -6,14 +6,14 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TypeGuard
+from typing import Final, TypeGuard
 
 import numpy as np
 
 from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap, scale_ratio_to_ttc
-from evaluator.predictions import misspelt
+from evaluator.predictions import misspelt, slips
 from evaluator.predictions.documents import Document, Members, Unit, kind_of, parse, read_document
-from evaluator.predictions.values import RULES, WITHOUT_ESTIMATE, allowed, broken_rule
+from evaluator.predictions.values import RULES, allowed, broken_rule
 from evaluator.problems import Findings, listed, pointer, quoted, reject
 from evaluator.truth.ground_truth import KeyKind, Manifest
 
@@ -37,6 +37,7 @@ def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
     max_members = 2 * manifest.n_sequences + 100_000
     document = read_document(parse(data, max_members=max_members))
     _require_filled(document.predictions, manifest)
+    _require_flat(document.predictions, manifest)
     findings = Findings()
     keys = _check_keys(document.predictions, manifest, findings, document.pointer)
     values = _column(document.predictions, manifest, findings, document.pointer, fault_of(document.unit))
@@ -65,6 +66,20 @@ def _require_filled(members: Members, manifest: Manifest) -> None:
             "expected a number for every sequence."
         )
         raise reject("not-a-number", message)
+
+
+def _require_flat(members: Members, manifest: Manifest) -> None:
+    """Refuse an object that names no sequence and has lists or objects, as frames and nested results do."""
+    by_id, by_natural_key = manifest.row_of_id, manifest.row_of_natural_key
+    if any(name in by_id or name in by_natural_key for name, _ in members):
+        return
+    for name, value in members:
+        if isinstance(value, list):  # objects are lists of members
+            message = (
+                f"No key of the file names a sequence, and {quoted(name)} has {kind_of(value)}; expected one "
+                'level of keys, {"KEY": NUMBER, …}, or an envelope with these as predictions.'
+            )
+            raise reject("wrong-top-level", message, pointer(name))
 
 
 def read_rates(document: Document, manifest: Manifest, findings: Findings) -> Floats:
@@ -128,8 +143,18 @@ def _check_keys(members: Members, manifest: Manifest, findings: Findings, pointe
             f"{_listed_rows(rows, manifest, kind=kind)}; "
             f"expected one for each of the manifest's {manifest.n_sequences:,} sequences, by {noun}."
         )
+        if n_shifted := misspelt.shift(names, manifest):
+            side = "high" if n_shifted > 0 else "low"
+            message += (
+                f" All anno_ids seem to be {abs(n_shifted):,} too {side}, so that values belong to other "
+                f"sequences: {_COUNTED if n_shifted == 1 else _USE_NATURAL}"
+            )
         findings.group("missing-keys", message, pointer_of(missing[0]), n_faults=n_missing)
     return kind
+
+
+_USE_NATURAL: Final = "write natural keys."
+_COUNTED: Final = "they are counted from 0. Better write natural keys."
 
 
 def _kind_of(id_names: list[str], natural_names: list[str], unknown: list[str]) -> KeyKind:
@@ -186,8 +211,8 @@ def fault_of(unit: Unit) -> Fault:
 
     def fault(value: object) -> tuple[str, str] | None:
         if not _is_number(value):
-            advice = f" {WITHOUT_ESTIMATE}" if value is None or value == "" else ""
-            return "not-a-number", f"The value is {kind_of(value)}; expected {expected}.{advice}"
+            sentence = f"The value is {kind_of(value)}; expected {expected}. {slips.of_value(value)}"
+            return "not-a-number", sentence.rstrip()
         # As the columnar reading sees it, a long whole number too.
         rule = broken_rule(float(value), unit=unit)
         return (rule.code, rule.message(value)) if rule else None

@@ -12,7 +12,7 @@ from typing import Final, Literal
 import numpy as np
 
 from evaluator.counting import file_size
-from evaluator.predictions import headers
+from evaluator.predictions import headers, slips
 from evaluator.predictions.recognition import is_printed_dict
 from evaluator.problems import Findings, pointer, quoted, reject
 
@@ -25,6 +25,9 @@ FIELDS: Final = ("unit", "fps", "frame_gap", "meta", "predictions")
 
 # Also matches a text that never ends, or looking for its end would begin anew at every mark inside it.
 _STRING: Final = re.compile(rb'"(?:[^"\\]|\\.)*+(?:"|\\?\Z)', re.DOTALL)
+_MAX_TOKEN: Final = 40
+_BEFORE_TOKEN: Final = re.compile(r"[:,\[{}\]]")
+_TOKEN: Final = re.compile(r"[^:,\[{}\]\n]{0,40}")
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 EMPTY_MESSAGE: Final = "The file is empty; expected JSON text with a number for every sequence."
 
@@ -106,18 +109,40 @@ def parse(data: bytes, *, max_members: int | None = None) -> object:
 
 
 def _hint(text: str, error: json.JSONDecodeError) -> str:
+    """Say what is probably wrong at a fault of a JSON text; starts with a space unless empty."""
     if is_printed_dict(text):
         return " The file looks like a dict as Python prints it; json.dump writes JSON."
-    if error.msg == "Extra data" and text[error.pos] == "{":
+    if error.msg == "Extra data":
+        return _hint_of_end(text[error.pos])
+    if text.find("}", error.pos) < 0:
+        return " The file ends early: copy or write it again."
+    if text[error.pos] in "}]" and text[: error.pos].rstrip().endswith(","):
+        return " Remove the comma before it."
+    if error.msg.startswith("Expecting property name"):
+        return " Write numbers with a point, not with a comma: 5.31." if text[error.pos].isdigit() else ""
+    return f" {slips.of_text(_token_at(text, error.pos))}".rstrip()
+
+
+def _hint_of_end(character: str) -> str:
+    if character == "{":
         return " The file has several objects, as JSON Lines; expected one object."
+    if character < " ":
+        return " Characters that cannot be seen come after the object: remove them, or write the file again."
     return ""
+
+
+def _token_at(text: str, position: int) -> str:
+    """Return what is between two marks of JSON, as far as it is short."""
+    before = _BEFORE_TOKEN.split(text[max(0, position - _MAX_TOKEN) : position])[-1]
+    return (before + _TOKEN.match(text, position)[0]).strip()  # type: ignore[index]  # it matches nothing, too
 
 
 def read_document(value: object) -> Document:
     """Split a parsed file; raises `Rejected` for a wrong top level or envelope."""
     if not isinstance(value, Members):
         message = (
-            f"The outermost value is {kind_of(value)}; expected an object of predictions or an envelope."
+            f"The outermost value is {kind_of(value)}; expected an object of predictions, "
+            '{"KEY": NUMBER, …}, or an envelope.'
         )
         raise reject("wrong-top-level", message)
     names = {name for name, _ in value}
@@ -177,8 +202,8 @@ def _unit(fields: Mapping[str, object], findings: Findings) -> Unit:
     unit = fields.get("unit")
     if unit == "ttc" or unit == "scale_ratio":  # noqa: PLR1714 -- narrows the type
         return unit
-    given = kind_of(unit) if "unit" in fields else "none"
-    findings.add("unknown-unit", f'The unit is {given}; expected "ttc" or "scale_ratio".', "/unit")
+    begin = f"The unit is {kind_of(unit)}" if "unit" in fields else "The envelope has no unit"
+    findings.add("unknown-unit", f'{begin}; expected "ttc", for seconds, or "scale_ratio".', "/unit")
     return "ttc"
 
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
+from evaluator.predictions import slips
 from evaluator.problems import Rejected, quoted, reject
 from evaluator.truth.csv_tables import require_one_column
 
@@ -59,15 +60,23 @@ def columns_of(header: Sequence[str]) -> tuple[Sequence[str], str, str | None]:
         message = f"The table has the columns {quoted(','.join(header))}; {EXPECTED}.{_slip(header)}"
         raise reject("missing-columns", message, "line 1")
     require_one_column(header, (*keys, *values, *rates), where="line 1")
-    if PREDICTED in header:
-        message = (
-            f"The table has the columns {quoted(values[0])} and {quoted(PREDICTED)}, as tsttc score "
-            "--per-sequence writes them: the true times and the predictions. Expected predictions alone: "
-            f"remove {quoted(values[0])} and rename {quoted(PREDICTED)} to ttc."
-        )
-        raise reject("bad-field", message, "line 1")
     _require_one_meaning(values, rates)
+    _require_no_other_predictions(header, values[0])
     return keys, values[0], rates[0] if rates else None
+
+
+def _require_no_other_predictions(header: Sequence[str], value: str) -> None:
+    """Refuse a table that has true times next to its predictions: nobody can tell which of them are meant."""
+    others = slips.predicted_among([name for name in header if name not in NAMES])
+    if not others:
+        return
+    whose = ", as tsttc score --per-sequence writes them" if others == [PREDICTED] else ""
+    own, other, name = quoted(value), quoted(others[0]), "ttc" if value == "ttc_s" else value
+    message = (
+        f"The table has the columns {own} and {other}{whose}; expected one column of predictions. If {other} "
+        f"has them, remove {own} and rename {other} to {name}. If {own} has them, remove {other}."
+    )
+    raise reject("bad-field", message, "line 1")
 
 
 def _require_one_meaning(values: Sequence[str], rates: Sequence[str]) -> None:
@@ -93,6 +102,17 @@ def _require_one_meaning(values: Sequence[str], rates: Sequence[str]) -> None:
             f"{quoted(values[0])} to scale_ratio."
         )
         raise reject("bad-rate", message, "line 1")
+
+
+def slip_of_row(row: Sequence[str], header: Sequence[str]) -> str:
+    """Name what is probably wrong with a row of another length; starts with a space unless empty."""
+    if row[0].startswith(("#", "//", "%")):
+        return " Remove comments."
+    if len(row) == len(header) + 1 and not row[-1].strip():
+        return " Remove the comma at the end of the rows, or add one to the header."
+    if len(row) > len(header) and all(map(_NUMBER.fullmatch, row[1:])):
+        return " Write numbers with a point, not with a comma: 5.31."
+    return ""
 
 
 def refusal_of_text(line: str) -> Rejected | None:
@@ -141,4 +161,26 @@ def _slip(header: Sequence[str]) -> str:
             " The first column has no name: pandas writes such a file. "
             'Write it with series.to_csv(FILE, index_label="anno_id", header=["ttc"]).'
         )
+    return _slip_of_names(header)
+
+
+def _slip_of_names(header: Sequence[str]) -> str:
+    if not all(name.isprintable() for name in header):
+        return " Names of columns contain invisible characters: remove them."
+    if len(header) == 1 and "," in header[0]:
+        return " Whole lines are in quotation marks: remove these."
+    return _slip_of_kinds(header)
+
+
+def _slip_of_kinds(header: Sequence[str]) -> str:
+    has_keys = "anno_id" in header or set(NATURAL_KEY) <= set(header)
+    has_values = not set(VALUES).isdisjoint(header)
+    if renamed := slips.renaming(header, has_keys=has_keys, has_values=has_values):
+        return f" Rename {renamed}."
+    if has_values and not has_keys:
+        return " No column names the sequences; pandas writes an index with frame.reset_index()."
+    if has_keys and not has_values:
+        return " No column has the predictions."
+    if "scale_ratio" in header and set(RATES).isdisjoint(header):
+        return " Scale ratios need the column fps or frame_gap."
     return ""

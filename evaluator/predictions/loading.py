@@ -215,13 +215,18 @@ def _member(data: bytes, start: int, *, max_bytes: int) -> tuple[bytes, int]:
     reader, parts = zlib.decompressobj(wbits=31), list[bytes]()
     while not reader.eof:
         if start >= len(data):
-            raise reject("not-json", "The file is not an intact gzip archive: it ends too early.")
+            raise reject(
+                "not-json",
+                "The file is not an intact gzip archive: it ends too early. Copy or write it again.",
+            )
         # In pieces: zlib copies what comes behind the member's end.
         piece = data[start : start + _CHUNK_BYTES]
         try:
             parts.append(reader.decompress(piece, max_bytes + 1))
         except zlib.error as error:
-            raise reject("not-json", f"The file is not an intact gzip archive: {error}.") from None
+            reason = str(error).rpartition(": ")[2]
+            message = f"The file is not an intact gzip archive: {reason}. Copy or write it again."
+            raise reject("not-json", message, f"byte {start:,}" if start else "") from None
         max_bytes -= len(parts[-1])
         if max_bytes < 0:
             message = f"The archive unpacks to more than {MAX_UNPACKED_BYTES:,} bytes; expected at most that."
@@ -241,9 +246,10 @@ def _of_table(data: bytes, *, max_rows: int | None) -> bytes:
     rows = csv.reader(_lines(body, max_rows=max_rows), strict=True)
     try:
         header = [name.strip() for name in next(rows)]
-        return document_of(header, _checked(rows, n_fields=len(header), n_before=n_before))
+        return document_of(header, _checked(rows, header=header, n_before=n_before))
     except csv.Error as error:
-        message = f"This is not a CSV table: {error}."
+        reason = "a quotation mark has no second one" if "end of data" in str(error) else str(error)
+        message = f"This is not a CSV table: {reason}."
         raise reject("bad-csv", message, f"line {n_before + rows.line_num}") from None
 
 
@@ -260,12 +266,21 @@ def _lines(text: str, *, max_rows: int | None) -> Iterator[str]:
         yield line
 
 
-def _checked(rows: Any, *, n_fields: int, n_before: int) -> Iterator[list[str]]:
-    """Yield the rows of a CSV reader that are not empty; `n_before` lines precede its text."""
-    for row in filter(None, rows):
-        if len(row) != n_fields:
-            message = f"The row has {len(row)} fields; expected {n_fields}, as the header."
-            raise reject("bad-csv", message, f"line {n_before + rows.line_num}")
+def _checked(rows: Any, *, header: Sequence[str], n_before: int) -> Iterator[list[str]]:
+    """Yield the rows of a CSV reader that have a text; `n_before` lines precede its text."""
+    for row in rows:
+        # A spreadsheet writes rows without any text as commas alone.
+        if not any(field.strip() for field in row):
+            continue
+        where = f"line {n_before + rows.line_num}"
+        if len(row) != len(header):
+            slip = headers.slip_of_row(row, header)
+            message = (
+                f"The row has {counted(len(row), 'field')}; expected {len(header):,}, as the header.{slip}"
+            )
+            raise reject("bad-csv", message, where)
+        if [field.strip() for field in row] == header:
+            raise reject("bad-csv", "The row repeats the header; expected it once. Remove this line.", where)
         yield row
 
 

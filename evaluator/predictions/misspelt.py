@@ -19,6 +19,9 @@ SPREADSHEET: Final = (
 )
 _SEPARATOR: Final = re.compile(r"[\\/,;:|]+")
 _AROUND: Final = " \t\r\n\"'()[]"
+_AT_ENDS: Final = _AROUND + "/\\"
+_SUFFIX: Final = re.compile(r"\.(?:png|jpe?g|json|pkl|npy|txt)\Z", re.IGNORECASE)
+_OTHER_SEPARATORS: Final = ("_", "-", ".", " ")
 _ROUNDED: Final = re.compile(r"[0-9](?:\.[0-9]{1,16})?[eE]\+[0-9]{1,3}")
 _DIGITS: Final = re.compile(r"[0-9]+")
 _PREFIX: Final = re.compile(r"[A-Za-z]+[_ -]?(?=[0-9]+\Z)")
@@ -38,6 +41,17 @@ def advice(unknown: Sequence[str], manifest: Manifest) -> str:
     faults = dict.fromkeys(fault for pair in meant.items() for fault in _faults(*pair))
     reasons = f": {'; '.join(faults)}" if faults else ""
     return f"Probably {quoted(given)} means {quoted(expected)}{reasons}."
+
+
+def shift(names: Iterable[str], manifest: Manifest) -> int:
+    """Return by how much all anno_ids of a file differ from those of the manifest; 0 if they do not."""
+    numbers = sorted(int(name) for name in names if _DIGITS.fullmatch(name) and len(name) < _MAX_DIGITS)
+    own = sorted(manifest.anno_id.tolist())
+    if len(numbers) != len(own) or not own:
+        return 0
+    difference = numbers[0] - int(own[0])
+    is_shifted = all(number - right == difference for number, right in zip(numbers, own, strict=True))
+    return difference if is_shifted else 0
 
 
 def is_natural(name: str) -> bool:
@@ -70,7 +84,13 @@ def _anno_ids_meant(names: Iterable[str], manifest: Manifest) -> dict[str, str]:
 
 
 def _parts(name: str) -> list[str]:
-    return [part.strip(_AROUND) for part in _SEPARATOR.split(name.strip(_AROUND))]
+    plain = _SUFFIX.sub("", name.strip(_AT_ENDS))
+    parts = _SEPARATOR.split(plain)
+    if len(parts) == 1:
+        # The name of a recording can contain each of these, the other three parts cannot.
+        splits = (plain.rsplit(separator, 3) for separator in _OTHER_SEPARATORS)
+        parts = next((each for each in splits if len(each) == 4), parts)
+    return [part.strip(_AROUND) for part in parts]
 
 
 def _plain(parts: Sequence[str]) -> tuple[str, ...]:
@@ -111,10 +131,8 @@ def _whole(text: str, *, factor: int = 1) -> str:
 
 def _faults(given: str, expected: str) -> Iterator[str]:
     """Name the differences between a key and the one that it probably means."""
-    if "/" in expected and "\\" in given:
-        yield "parts are separated by / , not by \\"
-    elif "/" in expected and given.count("/") != expected.count("/"):
-        yield "parts are separated by /"
+    if "/" in expected:
+        yield from _faults_between_parts(given, expected)
     for number, (part, right) in enumerate(zip(_parts(given), expected.split("/"), strict=False)):
         if part == right:
             continue
@@ -129,3 +147,14 @@ def _faults(given: str, expected: str) -> Iterator[str]:
             yield "capitals differ"
         elif _whole(part) == right:
             yield "a whole number is written as a float"
+
+
+def _faults_between_parts(given: str, expected: str) -> Iterator[str]:
+    if "\\" in given:
+        yield "parts are separated by / , not by \\"
+    elif given.strip("/").count("/") != expected.count("/"):
+        yield "parts are separated by /"
+    elif given != given.strip("/"):
+        yield "no / stands before or behind a key"
+    if _SUFFIX.search(given):
+        yield "a key has no suffix of a file"

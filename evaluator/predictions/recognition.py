@@ -22,6 +22,7 @@ class Kind(NamedTuple):
 _BY_START: Final[dict[bytes, Kind]] = {
     b"\x1f\x8b": Kind("a gzip archive", "Compress the file once."),
     b"\xfd7zXZ\x00": Kind("an xz archive", _SEND),
+    b"]\x00\x00": Kind("an LZMA archive", _SEND),
     b"BZh": Kind("a bzip2 archive", _SEND),
     b"\x28\xb5\x2f\xfd": Kind("a Zstandard (zstd) archive", _SEND),
     b"\x04\x22\x4d\x18": Kind("an LZ4 archive", _SEND),
@@ -38,12 +39,15 @@ _BY_START: Final[dict[bytes, Kind]] = {
     b"ORC": Kind("an ORC table", _JSON),
     b"Obj\x01": Kind("an Avro file", _JSON),
     b"SQLite format 3\x00": Kind("an SQLite database", _JSON),
+    b"PARE": Kind("an encrypted Parquet table", _JSON),
     b"PAR1": Kind("a Parquet table", "tsttc submit sends one, and tsttc convert makes JSON of it."),
     b"\xd0\xcf\x11\xe0": Kind("an old Excel or Word document", "Save the sheet as CSV, UTF-8."),
     b"\x89PNG": Kind("a PNG image", "Send the file with the predictions."),
     b"\xff\xd8\xff": Kind("a JPEG image", "Send the file with the predictions."),
     b"GIF8": Kind("a GIF image", "Send the file with the predictions."),
     b"%PDF": Kind("a PDF document", "Send the file with the predictions."),
+    b"MZ": Kind("a program of Windows", "Send the file with the predictions."),
+    b"\x00asm": Kind("a program (WebAssembly)", "Send the file with the predictions."),
     b"\x7fELF": Kind("a program", "Send the file with the predictions."),
     b"\x00\x05\x16\x07": Kind("an AppleDouble file of macOS", _HIDDEN),
     b"\x00\x00\x00\x01Bud1": Kind("a .DS_Store file of macOS", "Send the file with the predictions."),
@@ -58,7 +62,9 @@ _ZIP: Final = b"PK\x03\x04"
 _OF_ZIP: Final[dict[bytes, Kind]] = {
     b".npy": Kind("a NumPy .npz file", _JSON),
     b"/data.pkl": Kind("a PyTorch file", _JSON),
-    b"[Content_Types].xml": Kind("an Excel workbook", "Save the sheet as CSV, UTF-8."),
+    b"[Content_Types].xml": Kind(
+        "an Excel workbook or another Office document", "Save the sheet as CSV, UTF-8."
+    ),
     b"xl/": Kind("an Excel workbook", "Save the sheet as CSV, UTF-8."),
     b"mimetype": Kind("an OpenDocument sheet or text", "Save the sheet as CSV, UTF-8."),
 }
@@ -69,20 +75,23 @@ _BY_PATTERN: Final[dict[re.Pattern[bytes], Kind]] = {
     re.compile(rb"\x00+\Z"): Kind(
         "empty but for zero bytes, as an interrupted copy leaves it", "Copy or write it again."
     ),
-    re.compile(rb"\xff\xfe\x00\x00|\x00\x00\xfe\xff|[^\x00]\x00\x00\x00|\x00\x00\x00[^\x00\x01]"): Kind(
-        "text in UTF-32", _UTF8
-    ),
+    re.compile(
+        rb"\xff\xfe\x00\x00|\x00\x00\xfe\xff|(?:[^\x00]\x00\x00\x00){2}|(?:\x00\x00\x00[^\x00]){2}"
+    ): Kind("text in UTF-32", _UTF8),
     re.compile(rb"\xff\xfe|\xfe\xff|[^\x00]\x00[^\x00]\x00|\x00[^\x00]\x00[^\x00]"): Kind(
         "text in UTF-16", _UTF8
     ),
     re.compile(rb"\x80[\x02-\x05]|\((?:[dlt]p[0-9]+\n|[FIV])|[\]})]q\x00|c[a-z_.]+\n[a-zA-Z_]+\n"): Kind(
         "a Python pickle", _JSON
     ),
+    re.compile(rb"[\s\S]{2}[\s\S]\x00{5}\{"): Kind("a safetensors file", _JSON),
     re.compile(rb"x[\x01\x5e\x9c\xda]"): Kind("a zlib stream", _SEND),
     re.compile(rb"(?i)(?:\xef\xbb\xbf)?\s*<(?:!doctype\s+html|html|head|body|script)\b"): Kind(
         "a web page (HTML)", _AGAIN
     ),
     re.compile(rb"(?:\xef\xbb\xbf)?\s*<(?:\?xml|[A-Za-z!])"): Kind("XML text", _JSON),
+    # The last one: bytes of all kinds that no text begins with.
+    re.compile(rb"(?!\s*[\[{])[\s\S]{0,7}[\x00-\x08\x0e-\x1f]"): Kind("binary data, not text", _JSON),
 }
 _PYTHON: Final = re.compile(r"\s*\{\s*(?:'|-?[0-9]|np\.|\()")
 

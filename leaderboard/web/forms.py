@@ -24,7 +24,7 @@ class SiteForm(forms.Form):
         return cls(request.POST if request.method == "POST" else None, **options)
 
     def full_clean(self) -> None:
-        """Check the fields; refuse one that comes twice, of which Django keeps the last."""
+        """Check the fields; refuse one that comes twice: Django keeps the last one alone."""
         super().full_clean()
         if not self.is_bound:
             return

@@ -39,7 +39,8 @@ CASES: dict[str, tuple[Any, ...]] = {
     "cut off": (
         b'{"0": 5.31, "1": -12.9',
         "not-json",
-        "The text is not JSON: expecting ',' delimiter, found the end of the file.",
+        "The text is not JSON: expecting ',' delimiter, found the end of the file. "
+        "The file ends early: copy or write it again.",
         "line 1, column 23",
     ),
     "empty": (
@@ -79,7 +80,8 @@ CASES: dict[str, tuple[Any, ...]] = {
     "a number as no JSON writes it": (
         text_with(_0="05"),
         "not-json",
-        """The text is not JSON: expecting ',' delimiter, found "5, \\"1\\": -12.9, \\"2\\": ".""",
+        """The text is not JSON: expecting ',' delimiter, found "5, \\"1\\": -12.9, \\"2\\": ". """
+        "Write the number itself: 5.0.",
         "line 1, column 8",
     ),
     "NUL": (
@@ -116,12 +118,13 @@ CASES: dict[str, tuple[Any, ...]] = {
     "a list": (
         b"[5.31, -12.9]",
         "wrong-top-level",
-        "The outermost value is a list; expected an object of predictions or an envelope.",
+        'The outermost value is a list; expected an object of predictions, {"KEY": NUMBER, …}, or an '
+        "envelope.",
     ),
     "null": (
         b"null",
         "wrong-top-level",
-        "The outermost value is null; expected an object of predictions or an envelope.",
+        'The outermost value is null; expected an object of predictions, {"KEY": NUMBER, …}, or an envelope.',
     ),
     "predictions in a list": (
         envelope([5.31], unit="ttc"),
@@ -132,19 +135,19 @@ CASES: dict[str, tuple[Any, ...]] = {
     "no unit": (
         envelope(GOOD),
         "unknown-unit",
-        'The unit is none; expected "ttc" or "scale_ratio".',
+        'The envelope has no unit; expected "ttc", for seconds, or "scale_ratio".',
         "/unit",
     ),
     "unknown unit": (
         envelope(GOOD, unit="seconds"),
         "unknown-unit",
-        'The unit is the string "seconds"; expected "ttc" or "scale_ratio".',
+        'The unit is the string "seconds"; expected "ttc", for seconds, or "scale_ratio".',
         "/unit",
     ),
     "unit of another type": (
         envelope(GOOD, unit=None),
         "unknown-unit",
-        'The unit is null; expected "ttc" or "scale_ratio".',
+        'The unit is null; expected "ttc", for seconds, or "scale_ratio".',
         "/unit",
     ),
     "no predictions": (
@@ -271,7 +274,7 @@ CASES: dict[str, tuple[Any, ...]] = {
     "a string": (
         text_with(_1='"5.3"'),
         "not-a-number",
-        f'The value is the string "5.3"; {EXPECTED_SECONDS}',
+        f'The value is the string "5.3"; {EXPECTED_SECONDS} Write the number itself: 5.3.',
         "/1",
     ),
     "a null": (
@@ -289,13 +292,13 @@ CASES: dict[str, tuple[Any, ...]] = {
     "a value in a list": (
         text_with(_1="[5.3]"),
         "not-a-number",
-        f"The value is a list; {EXPECTED_SECONDS}",
+        f"The value is a list; {EXPECTED_SECONDS} A sequence has one value: the one at its last frame.",
         "/1",
     ),
     "a value in an object": (
         text_with(_1='{"ttc": 5.3}'),
         "not-a-number",
-        f"The value is an object; {EXPECTED_SECONDS}",
+        f"The value is an object; {EXPECTED_SECONDS} Write the number itself.",
         "/1",
     ),
     "NaN": (text_with(_1="NaN"), "nan", f"The value is NaN; {EXPECTED_SECONDS} {WITHOUT_ESTIMATE}", "/1"),

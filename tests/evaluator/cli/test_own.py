@@ -84,9 +84,7 @@ def test_withdraw_asks_first_and_says_what_became_of_it(tsttc: Tsttc, site: Reco
     assert (done.exit_code, done.stdout) == (0, "Foo++ on val is cancelled.\n")
 
 
-def test_move_sends_the_method_and_says_where_the_submission_is_now(
-    tsttc: Tsttc, site: RecordedSite
-) -> None:
+def test_move_sends_the_method_and_says_where_the_submission_is_now(tsttc: Tsttc, site: RecordedSite) -> None:
     moved = SUBMISSIONS[0] | {"method": "Right net"}
     site.put(f"POST /api/v1/submissions/{ID}/move", Reply(moved))
     result = tsttc("move", ID, "--method", "Right net")

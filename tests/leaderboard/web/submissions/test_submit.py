@@ -220,7 +220,7 @@ def test_announced_excess_is_answered_413_without_reading(
 
 @pytest.mark.parametrize("field", ["file", "split", "method", "note", "paper_url", "confirmed"])
 @pytest.mark.parametrize("kind", ["texts", "files", "both"])
-def test_a_field_that_comes_twice_is_refused_at_its_place_in_the_words_of_the_api(
+def test_a_field_that_comes_twice_is_refused_in_the_words_of_the_api(
     signed_in: Client, edition: Edition, field: str, kind: str
 ) -> None:
     data = builders.predictions(edition)
