@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, forbid_calls, limit, obey_the_parent_alone
-from evaluator.predictions.columns import key_words
 from evaluator.predictions.loading import read_sent
 from evaluator.problems import Rejected
 from evaluator.truth.ground_truth import Manifest
@@ -19,7 +18,7 @@ from evaluator.truth.ground_truth import Manifest
 
 def warm_up(manifest: Manifest) -> None:
     # Late imports and the manifest's keys: nothing can be opened afterwards.
-    _ = key_words(manifest), manifest.row_of_natural_key
+    _ = manifest.row_of_id, manifest.row_of_natural_key
     for sample in (
         b"{",
         b"[]",

@@ -18,9 +18,8 @@ from tests.evaluator.worlds import envelope, flat, make_truth
 
 SMALL = make_truth([4.0, -10.0, 1.0]).manifest
 WIDE = make_truth([4.0] * 7, anno_ids=[5, 42, 999, 1_000, 65_536, 999_999, 100_000]).manifest
-FIVE_DIGITS = make_truth([4.0] * 5, anno_ids=[0, 7, 10_000, 99_999, 65_536]).manifest
 HUGE = make_truth([4.0] * 3, anno_ids=[0, 1_000_000, 2**63 - 1]).manifest
-MANIFESTS = [SMALL, FIVE_DIGITS, WIDE, HUGE]
+MANIFESTS = [SMALL, WIDE, HUGE]
 
 
 def reading(data: bytes, manifest: Manifest) -> object:
@@ -182,11 +181,6 @@ TOKENS += ["\x00", "é"]
     edits=st.lists(st.tuples(st.integers(0, 80), st.integers(0, 4), st.sampled_from(TOKENS)), max_size=3),
 )
 @example(start=b'{"0"5.3:,"1":2,"2":3}', edits=[])
-@example(start=b'{"0":5.3,7"1":8,"2":3}', edits=[])
-@example(start=b'{"0",5.3:"1",2:"2",3}', edits=[])
-@example(start=b'{5.3 "0":,6.3 "1":,7.3 "2":}', edits=[])
-@example(start=b'{ "0":5.3, 7 "1":, 8 9 "2": }', edits=[])
-@example(start=b'{"0":5.25   ,"1":6.25   ,"2":7.25,}', edits=[])
 @example(start=b'{"0":5.25,"1":6.25,"2":7.25},{}', edits=[])
 @example(start=b'{"0":5,"1":6,"2":7}', edits=[])
 @example(start=b'{"0": 1.5, "1": 2.5, "2": 3.5, "2": 3.5}', edits=[])
@@ -264,18 +258,6 @@ def test_files_of_common_layouts_are_read_by_columns(
         assert_equivalent(b'{"unit": "ttc", "predictions": ' + data + b"}", manifest, by_columns=True)
 
 
-def test_many_sequences_in_any_order_read_the_same_both_ways() -> None:
-    rng = np.random.default_rng(5)
-    ids = rng.permutation(200_000)[:5_000]
-    manifest = make_truth(np.full(5_000, 4.0), anno_ids=ids.tolist()).manifest
-    for order in (np.arange(5_000), rng.permutation(5_000)):
-        values = rng.normal(0, 10, 5_000)
-        members = dict(zip(map(str, ids[order].tolist()), values.tolist(), strict=True))
-        data = flat(members)
-        assert_equivalent(data, manifest, by_columns=True)
-        assert read_predictions(data, manifest=manifest).ttc_s[order].tolist() == values.tolist()
-
-
 @pytest.mark.parametrize("manifest", [LONG, WIDE])
 @pytest.mark.parametrize("separators", [(",", ":"), (", ", ": "), (",\n    ", ": ")])
 def test_a_doubled_key_is_seen_in_any_order(manifest: Manifest, separators: tuple[str, str]) -> None:
@@ -290,15 +272,6 @@ def test_a_doubled_key_is_seen_in_any_order(manifest: Manifest, separators: tupl
             doubled = data.replace(f'"{key}"', f'"{manifest.anno_id_keys[0]}"')
             assert_equivalent(doubled.encode(), manifest)
             assert read_column(doubled.encode(), manifest) is None
-
-
-@pytest.mark.parametrize("manifest", [WIDE, FIVE_DIGITS])
-def test_a_key_needs_its_first_quotation_mark(manifest: Manifest) -> None:
-    data = json.dumps(dict.fromkeys(manifest.anno_id_keys, 2.5))
-    assert_equivalent(data.encode(), manifest, by_columns=True)
-    key = manifest.anno_id_keys[-1]
-    for faulty in (data.replace(f'"{key}"', f'5{key}"'), data.replace(f'"{key}"', f' {key}"')):
-        assert read_column(faulty.encode(), manifest) is None
 
 
 def test_rates_and_ratios_are_converted_the_same_both_ways() -> None:
