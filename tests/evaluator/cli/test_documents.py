@@ -55,6 +55,15 @@ def test_guide_lists_every_exit_code_with_its_meaning() -> None:
     assert all(f"{code.value:>3}  {meaning}" in EPILOG for code, meaning in MEANINGS.items())
 
 
+def test_documents_for_scripts_name_the_code_of_a_file_that_is_not_confirmed() -> None:
+    readme = (REPOSITORY / "README.md").read_text().partition("Exit codes say what failed:")[2]
+    codes = re.findall(r"(?:^|, )(\d+) ", readme.partition(" Read on")[0].strip())
+    assert codes == [str(code.value) for code in Exit if code < Exit.INTERRUPTED]
+    for name in ("docs/ci.md", "docs/researchers.md", "docs/faq.md", "examples/ci/gitlab-ci.yml"):
+        text = (REPOSITORY / name).read_text()
+        assert re.search(rf"(?:code|With)s? {Exit.UNCONFIRMED.value}\b", text), name
+
+
 def test_guide_names_every_score_and_operator_of_a_gate() -> None:
     gate = GUIDE.read_text().partition("**A gate sets the exit code**")[2].partition("\n## ")[0]
     assert [name for name in (*SCORE_NAMES, *OPERATORS) if f"`{name}`" not in gate] == []

@@ -1,6 +1,7 @@
 """`tsttc new-method`: a package that trains, and passes its own test, as it is written."""
 
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -63,6 +64,35 @@ def test_predict_in_an_empty_checkout_names_what_the_job_has_to_fetch(here: Path
     assert "frames/val is not there" in predict(TSTTC_SOURCE="https://leaderboard.invalid/x.whl")
     present = {"TSTTC_SOURCE": "https://leaderboard.invalid/x.whl", "FRAMES": str(here)}
     assert "weights.pt is not there" in predict(**present)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the jobs run on Linux")
+@pytest.mark.parametrize(("index", "options"), [(None, ""), ("", ""), ("ADDRESS", "--index-url ADDRESS ")])
+def test_predict_takes_torch_from_the_index_that_the_job_names_and_else_from_the_usual_one(
+    here: Path, index: str | None, options: str
+) -> None:
+    assert written("far-net").exit_code == 0
+    folder, programs = here / "far-net", here / "bin"
+    # In place of pip and of the command, which would fetch much: it writes down how it is called.
+    copies = "".join(f'[ -e env/bin/{name} ] || cp "$0" env/bin/{name}\n' for name in ("python", "tsttc"))
+    programs.mkdir()
+    (programs / "python3").write_text(f'#!/bin/sh\necho "$@" >> calls\nmkdir -p env/bin\n{copies}')
+    (programs / "python3").chmod(0o755)
+    environment = {"PATH": f"{programs}:{os.environ['PATH']}", "FRAMES": str(here), "WEIGHTS": "predict.sh"}
+    environment |= {"TSTTC_SOURCE": "WHEEL"} | ({} if index is None else {"TORCH_INDEX": index})
+    subprocess.run(["./predict.sh", "out.json"], cwd=folder, env=environment, check=True)
+    calls = (folder / "calls").read_text().splitlines()
+    assert f"-m pip install --quiet {options}torch" in calls
+    assert "-m pip install --quiet tsttc @ WHEEL ." in calls
+    workflow = (folder / ".github" / "workflows" / "tsttc.yml").read_text()
+    assert '${TORCH_INDEX:+--index-url "$TORCH_INDEX"} torch' in workflow
+
+
+def test_no_template_names_the_host_of_a_package_index(here: Path) -> None:
+    assert written("far-net").exit_code == 0
+    texts = [path.read_text() for path in (here / "far-net").rglob("*") if path.is_file()]
+    texts += [path.read_text() for path in (REPOSITORY / "docs").glob("*.md")]
+    assert [host for text in texts for host in re.findall(r"--index-url[ =]https?:\S+", text)] == []
 
 
 @pytest.mark.torch
