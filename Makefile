@@ -25,7 +25,7 @@ SPREAD := -n auto --dist loadfile --no-loadscope-reorder
 # So numpy has no threads of its own, which would only wait for each other. It reads this when it is imported.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo demo-runs test test-fast test-torch chaos validation bench lint format screenshots release lock echarts clean
+.PHONY: help demo demo-runs test test-fast test-torch chaos validation bench mutants lint format screenshots release lock echarts clean
 
 help: ## list these commands
 	@awk -F ' ## ' '/^[a-z-]+:.* ## / { sub(/:.*/, "", $$1); printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -55,6 +55,13 @@ validation: $(DEV_STAMP) ## print the tables of docs/validation.md and the figur
 
 bench: $(DEV_STAMP) ## measure the figures of docs/capacity.md and compare them with their targets
 	@$(PY) -m benchmarks
+
+ROOM ?= boards
+SEED ?= 1
+N ?= 60
+
+mutants: $(DEV_STAMP) ## plant small faults in the last commit and list those that no test notices (ROOM=… SEED=… N=… AT=file:line)
+	@$(PY) -m tests.mutants $(ROOM) --seed $(SEED) --number $(N) --at "$(AT)"
 
 # PyPI has Biome for Linux on x86_64 alone; CI runs there.
 BIOME := $(if $(filter Linux-x86_64,$(shell uname -sm | tr ' ' -)),$(VENV)/bin/biome,@echo "styles and scripts are not looked at here: biome")
