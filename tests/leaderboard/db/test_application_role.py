@@ -1,11 +1,14 @@
 """The role of web and workers on PostgreSQL: it does all their work, and cannot touch the audit log."""
 
+import random
 import secrets
+import threading
 from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
 
 import pytest
+from django.apps import apps
 from django.core.management import CommandError, call_command
 from django.db import IntegrityError, ProgrammingError, connection, transaction
 from django.test import Client
@@ -13,10 +16,11 @@ from django.utils import timezone
 from pytest_django import Settings
 
 from leaderboard import audit
-from leaderboard.management.commands.grant import make_role
+from leaderboard.management.commands.grant import ONLY, make_role
 from leaderboard.methods import visibility
-from leaderboard.models import AuditEvent, Edition, Status, Submission, User
+from leaderboard.models import AuditEvent, Edition, Status, Submission, SweepBeat, User
 from leaderboard.models.audit import GENESIS
+from leaderboard.upkeep import pollers
 from tests import builders
 from tests.editions import corrected, open_edition, publish
 
@@ -91,6 +95,37 @@ def test_it_submits_scores_shows_publishes_and_reads_like_the_owner(
     assert visitor.get("/team/").status_code == 200
     assert audit.seal() > 3
     assert (audit.verify().unsealed.n_events, audit.verify().breaks) == (0, ())
+
+
+@POSTGRESQL_ONLY
+def test_it_does_what_workers_do_by_the_clock_and_shows_every_page_of_maintainers(
+    edition: Edition, owner: User, maintainer: User, as_application: None
+) -> None:
+    builders.submit(owner, builders.predictions(edition))
+    pollers.keep_up(rng=random.Random(0), stopping=threading.Event())
+    assert SweepBeat.objects.get().cleaned_at is not None
+    assert (audit.verify().unsealed.n_events, audit.verify().breaks) == (0, ())
+    client = Client()
+    client.force_login(maintainer)
+    for name in ("", "audit/", "teams/", "mails/", "queue/", "quotas/", "published/", "splits/add/"):
+        assert client.get(f"/maintain/{name}").status_code == 200, name
+
+
+@POSTGRESQL_ONLY
+def test_it_reads_and_writes_every_table_but_the_two_that_are_guarded(as_application: None) -> None:
+    tables = {model._meta.db_table for model in apps.get_models(include_auto_created=True)}
+    tables |= {"leaderboard_cache"}
+    lacking = {}
+    with connection.cursor() as cursor:
+        for table in tables - set(ONLY):
+            rights = ("SELECT", "INSERT", "UPDATE", "DELETE")
+            cursor.execute(
+                f"SELECT {', '.join(f'has_table_privilege(%s, {right!r})' for right in rights)}",
+                [table] * len(rights),
+            )
+            if missing := [right for right, has in zip(rights, cursor.fetchone(), strict=True) if not has]:
+                lacking[table] = missing
+    assert lacking == {}
 
 
 @POSTGRESQL_ONLY

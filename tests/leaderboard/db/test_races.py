@@ -8,7 +8,9 @@ from threading import Barrier
 from typing import TypeVar
 
 import pytest
+from allauth.account.models import EmailAddress
 from django.db import connection
+from pytest_django.fixtures import Settings
 
 from leaderboard import audit
 from leaderboard.editions import ground_truth, splits
@@ -32,6 +34,8 @@ from leaderboard.people import invitations, teams, tokens
 from leaderboard.quotas import usage
 from leaderboard.storage import hidden_marks
 from tests import builders
+from tests.leaderboard.quotas.test_mailboxes import account
+from tests.leaderboard.web.account import proving
 from tests.services import ON_POSTGRESQL, crowd_on_postgres
 
 T = TypeVar("T")
@@ -85,6 +89,31 @@ def test_twenty_submissions_at_once_take_exactly_the_five_slots_there_are(
 
     assert sum(at_once(20, submit)) == 5
     assert Submission.objects.count() == Evaluation.objects.count() == 5
+
+
+def test_accounts_that_count_together_take_at_once_exactly_the_slots_there_are(
+    edition: Edition, settings: Settings
+) -> None:
+    """One account for each spelling, one with a second proved address, and one that had the mailbox once."""
+    Split.objects.filter(pk="test").update(quota_limit=3, quota_window=timedelta(days=30))
+    proving.proving(settings)
+    people = [account(f"{name}@example.org") for name in ("x", "x+1", "y", "z")]
+    for user, name in zip(people, ("z+1", "y+1", "x+2", "x+3"), strict=True):
+        EmailAddress.objects.create(user=user, email=f"{name}@example.org", verified=True)
+    former = account("former@example.org")
+    EmailAddress.objects.create(user=former, email="x+4@example.org", verified=True)
+    builders.submit(former, builders.predictions(edition, factor=3), visibility="PRIVATE")
+    EmailAddress.objects.filter(email="x+4@example.org").delete()
+    data = [builders.predictions(edition, factor=1 + number / 1000) for number in range(24)]
+
+    def submit(number: int) -> bool:
+        try:
+            return builders.send(people[number % 4], data[number], method=f"M{number}").is_new
+        except usage.QuotaExceeded:
+            return False
+
+    assert sum(at_once(24, submit)) == 2
+    assert Submission.objects.count() == 3
 
 
 def test_tokens_made_at_once_stay_within_their_number(owner: User) -> None:
