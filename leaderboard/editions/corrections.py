@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
+from typing import Final
 
 from django.db import transaction
 from django.db.models import Count, Min, Q
@@ -16,9 +17,11 @@ from evaluator.metrics.protocol import get_protocol
 from leaderboard import audit
 from leaderboard.db import clock
 from leaderboard.editions import ground_truth
-from leaderboard.errors.refusals import Refused, require_maintainer
+from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
 from leaderboard.models import Edition, Evaluation, GroundTruth, Publication, Split, Status, Submission, User
 from leaderboard.queue import lifecycle
+
+MAX_REASON: Final = 1000
 
 
 @dataclass(frozen=True)
@@ -264,7 +267,7 @@ def _reason(text: str) -> str:
     text = " ".join(text.split())
     if not text:
         raise Refused("edition-refused", "No reason was given; expected a sentence for the public changelog.")
-    return text[:1000]
+    return clean_text("reason", text[:MAX_REASON], limit=MAX_REASON)
 
 
 def _left_out_sentence(edition: Edition, waiting: Sequence[Submission], losing: Sequence[Submission]) -> str:

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import unicodedata
 from collections.abc import Collection, Iterator, Mapping
 from datetime import datetime
 from typing import Any, Final
@@ -12,7 +13,7 @@ from django.core.validators import URLValidator
 
 from evaluator.counting import file_size
 from evaluator.metrics.protocol import PROTOCOLS, SCORE_NAMES
-from leaderboard.errors.refusals import Refused
+from leaderboard.errors.refusals import BIDI_CONTROLS, Refused
 
 MAX_BYTES: Final = 1_000_000
 MAX_PROBLEMS: Final = 20
@@ -194,13 +195,18 @@ def _text(
         yield f"{where}/{name}: {_kind_at(holder, name)}; expected a text."
     elif len(text) > limit:
         yield f"{where}/{name}: {len(text)} characters; expected at most {limit}."
-    elif "\x00" in text or any(0xD800 <= ord(character) < 0xE000 for character in text):
+    elif any(_is_unprintable(character) for character in text):
         yield f"{where}/{name}: a character that cannot be printed; expected printable text."
     elif is_address and text:
         try:
             _is_web_address(text)
         except ValidationError:
             yield f"{where}/{name}: {text[:60]!r}; expected an address that begins with http:// or https://."
+
+
+def _is_unprintable(character: str) -> bool:
+    is_control = unicodedata.category(character) in {"Cc", "Cs"} and character not in "\r\n\t"
+    return is_control or character in BIDI_CONTROLS
 
 
 def _are_columns(columns: list[Any]) -> bool:

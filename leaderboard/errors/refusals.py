@@ -53,7 +53,7 @@ def shown_split(name: str) -> Split:
 
 
 # They change the order in which everything after them is read, beyond the end of the text.
-_BIDI_CONTROLS = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+BIDI_CONTROLS = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 
 
 def clean_text(name: str, text: str, *, limit: int, required: bool = True) -> str:
@@ -71,18 +71,26 @@ def clean_text(name: str, text: str, *, limit: int, required: bool = True) -> st
         )
     for character in text:
         is_control = unicodedata.category(character) in {"Cc", "Cs", "Co", "Cn"}
-        if (is_control and character not in "\r\n\t") or character in _BIDI_CONTROLS:
-            raise Refused(
-                "bad-character",
-                f"The field '{name}' has the character U+{ord(character):04X}; expected printable text.",
-                field=name,
-            )
+        if (is_control and character not in "\r\n\t") or character in BIDI_CONTROLS:
+            raise _bad_character(name, character)
     return text
+
+
+def _bad_character(name: str, character: str) -> Refused:
+    return Refused(
+        "bad-character",
+        f"The field '{name}' has the character U+{ord(character):04X}; expected printable text.",
+        field=name,
+    )
 
 
 def clean_url(name: str, text: str) -> str:
     """Check an address of the web; it may be empty. Raises `Refused`."""
     text = clean_text(name, text, limit=MAX_URL, required=False)
+    for character in text:
+        # Nobody sees them, and two addresses would look the same.
+        if unicodedata.category(character) in {"Cf", "Zl", "Zp"}:
+            raise _bad_character(name, character)
     if text:
         try:
             _is_web_address(text)

@@ -1,10 +1,12 @@
 """Forms for opening, publishing, rolling back and discarding editions."""
 
+from functools import partial
 from typing import Any, Final
 
 from django import forms
 
 from evaluator.metrics.protocol import PROTOCOLS, Protocol
+from leaderboard.errors.refusals import Refused, clean_text
 from leaderboard.models import GroundTruth, Split
 from leaderboard.web.forms import SiteForm, confirmation
 
@@ -17,7 +19,15 @@ def reason_field(help_text: str, *, at: str = "audit log", max_length: int = 100
         widget=forms.Textarea(attrs={"rows": 3}),
         help_text=help_text,
         error_messages={"required": f"No reason was given; expected a sentence for the {at}."},
+        validators=[partial(_require_printable, max_length=max_length)],
     )
+
+
+def _require_printable(text: str, *, max_length: int) -> None:
+    try:
+        clean_text("reason", text[:max_length], limit=max_length)
+    except Refused as refused:
+        raise forms.ValidationError(str(refused)) from refused
 
 
 def _protocol_words(protocol: Protocol) -> str:

@@ -112,6 +112,27 @@ def test_after_five_wrong_passwords_the_right_one_is_refused_too(shared_cache: N
 
 
 @pytest.mark.slow
+def test_after_twenty_sign_ins_with_the_right_password_one_account_waits_and_others_do_not(
+    shared_cache: None, owner: User, stranger: User, settings: Settings
+) -> None:
+    # Without the limit for all accounts of an address, which as many would reach.
+    settings.ACCOUNT_RATE_LIMITS = {**settings.ACCOUNT_RATE_LIMITS, "login": None}
+
+    def answer(user: User, **environment: str) -> tuple[int, bytes]:
+        form = {"login": user.email, "password": "correct horse"}
+        response = Client(**environment).post("/accounts/login/", form)
+        return response.status_code, response.content
+
+    assert [answer(owner)[0] for _ in range(20)] == [302] * 20
+    status, page = answer(owner)
+    assert status == 200
+    assert b"Too many sign-ins. Try again in 5 minutes." in page
+    assert answer(stranger)[0] == 302
+    # Whoever does this at one address keeps the account out of no other one.
+    assert answer(owner, REMOTE_ADDR="203.0.113.9")[0] == 302
+
+
+@pytest.mark.slow
 def test_a_forwarding_header_does_not_help_the_guesser(
     shared_cache: None, db: None, settings: Settings
 ) -> None:
