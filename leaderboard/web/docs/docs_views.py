@@ -5,7 +5,7 @@ Most answer without the database. Long pages are compressed here: not every site
 
 import threading
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import render
@@ -47,12 +47,26 @@ _CHAPTERS_AT_A_GLANCE: Final = [
 ]
 
 
-def _navigation(address: str) -> list[tuple[str, list[GuideLink], bool]]:
-    """Return the sections of the navigation, and whether each is open: the page's own, or all without one."""
-    sections = guides.navigation()
-    has_page = [any(link.address == address for link in links) for _, links in sections]
-    is_in_one = any(has_page[1:])
-    return [(*section, has_it or not is_in_one) for section, has_it in zip(sections, has_page, strict=True)]
+class NavigationSection(NamedTuple):
+    """Some links of the side navigation.
+
+    Each has the value of its `aria-current`: "page", "true" for the page above this one, or nothing.
+    """
+
+    title: str
+    links: list[tuple[GuideLink, str]]
+    is_open: bool
+
+
+def _navigation(address: str, *, above: str = "") -> list[NavigationSection]:
+    """Return the sections, of which the page's own is open; all are, if the page is in none with a title."""
+    current = {above: "true", address: "page"}
+    sections = []
+    for title, links in guides.navigation():
+        marked = [(link, current.get(link.address, "")) for link in links]
+        sections.append((title, marked, any(mark for _, mark in marked)))
+    is_in_one = any(is_open for title, _, is_open in sections if title)
+    return [NavigationSection(title, links, is_open or not is_in_one) for title, links, is_open in sections]
 
 
 @gzip_page
@@ -72,11 +86,10 @@ def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
     before, after = guides.neighbours(guide_name)
     above = reverse("guide", args=["decisions"]) if guide_name.startswith("adr/") else ""
     context = {
-        "navigation": _navigation(above or request.path),
+        "navigation": _navigation(request.path, above=above),
         "guide": guides.guide(guide_name),
         "before": before,
         "after": after,
-        "above": above,
     }
     return render(request, "docs/guide.html", context)
 
@@ -94,9 +107,26 @@ def find(request: HttpRequest) -> HttpResponse:
         hits = search.find(query) if query else []
     finally:
         _searching.release()
-    navigation = _navigation(request.path)
-    context = {"navigation": navigation, "query": query, "hits": hits, "most": search.MAX_HITS}
+    context = {
+        "navigation": _navigation(request.path),
+        "query": query,
+        "hits": hits,
+        "count_words": count_words(len(hits)),
+    }
     return render(request, "docs/search.html", context)
+
+
+def count_words(n_hits: int) -> str:
+    """Say how many parts of the guides a search has found.
+
+    >>> count_words(1), count_words(2), count_words(search.MAX_HITS)
+    ('1 result', '2 results, best page first', 'The 12 best results, best page first')
+    """
+    if n_hits == 1:
+        return "1 result"
+    if n_hits < search.MAX_HITS:
+        return f"{n_hits} results, best page first"
+    return f"The {search.MAX_HITS} best results, best page first"
 
 
 def _chapters(operation: Mapping[str, Any]) -> list[TextHeading]:
@@ -118,11 +148,10 @@ def api_operation(request: HttpRequest, operation_id: str) -> HttpResponse:
     if operation is None:
         raise Http404(f"There is no operation {operation_id!r}.")
     context = {
-        "navigation": _navigation(reverse("api_reference")),
+        "navigation": _navigation(request.path, above=reverse("api_reference")),
         "guide": {"chapters": _chapters(operation)},
         "operation": operation,
         "example": api_examples.shown(operation_id),
-        "above": reverse("api_reference"),
     }
     return render(request, "docs/api_operation.html", context)
 

@@ -27,6 +27,7 @@ def current() -> dict[str, Any] | None:
     return {
         "name": path.name,
         "version": path.name.split("-")[1],
+        "folder": settings.SITE_URL + reverse("dist"),
         "address": settings.SITE_URL + reverse("dist_file", args=[path.name]),
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "n_bytes": path.stat().st_size,

@@ -38,6 +38,20 @@ def test_every_page_of_the_documentation_has_the_navigation_and_marks_where_one_
         } <= listed
 
 
+@pytest.mark.parametrize(
+    ("address", "above"),
+    [("/docs/adr/0002-the-database-is-the-queue/", "/docs/decisions/"), ("/docs/api/submit/", "/docs/api/")],
+)
+def test_a_page_that_the_navigation_does_not_list_marks_the_page_above_it(
+    client: Client, address: str, above: str
+) -> None:
+    navs = pages.get(client, address).all("nav", **{"aria-label": "Documentation"})
+    marked = [link for nav in navs for link in nav.all("a") if "aria-current" in link.attributes]
+    assert [(link.attributes["href"], link.attributes["aria-current"]) for link in marked] == [
+        (above, "true")
+    ]
+
+
 def test_the_address_of_a_guide_without_its_slash_leads_to_it_and_others_are_404(
     client: Client, benchmark: None
 ) -> None:
