@@ -67,6 +67,11 @@ class Paper(_Table, frozen=True):
         return match[1] if match else ""
 
     @property
+    def reference(self) -> str:
+        """Return authors, year, title and address as one line."""
+        return f"{', '.join(self.authors)} ({self.year}). {self.title}. {self.url}"
+
+    @property
     def bibtex_entry(self) -> str:
         """Return the BibTeX entry, one line break at its end."""
         return self.bibtex.strip() + "\n"
@@ -111,6 +116,11 @@ class Benchmark(_Table, frozen=True):
     paper: Paper | None = None
     figure: Figure | None = None
     splits: tuple[FirstSplit, ...] = ()
+
+    @property
+    def summary(self) -> str:
+        """Return the task, and what the site shows of it."""
+        return f"{self.task} Ranked results with confidence intervals."
 
     @property
     def has_paper_tables(self) -> bool:

@@ -31,8 +31,10 @@ def home(request: HttpRequest) -> HttpResponse:
     splits = splits_of(request)
     main, now = main_split(splits), timezone.now()
     in_order = [main, *splits] if main else []
+    open_split = next((split for split in in_order if admissions.is_open(split, now=now)), None)
     context = {
-        "open_split": next((split for split in in_order if admissions.is_open(split, now=now)), None),
+        "open_split": open_split,
+        "submit_words": _submit_words(open_split, main=main) if open_split else "",
         "facts": [*_counts(in_order), *settings.BENCHMARK.landing.facts, *_ranges(main)],
         "dates": _dates(splits, reader=request.user, now=now),
         "news": latest(splits),
@@ -56,6 +58,15 @@ def main_split(splits: Sequence[Split]) -> Split | None:
     """Return the benchmark's first board, else the first split."""
     name = settings.BENCHMARK.default_split
     return next((split for split in splits if split.pk == name), next(iter(splits), None))
+
+
+def _submit_words(open_split: Split, *, main: Split | None) -> str:
+    """Name the button that leads to the form of submissions."""
+    if open_split == main:
+        return "Submit"
+    if open_split.is_simulated:
+        return f"Try a submission ({open_split.title.lower()})"
+    return f"Submit to {open_split.title}"
 
 
 def _counts(splits: Sequence[Split]) -> list[tuple[str, str]]:

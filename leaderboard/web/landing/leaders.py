@@ -20,11 +20,24 @@ def leaders(board: Board) -> list[dict[str, Any]]:
             "entry": entry,
             "team": team_of(entry),
             "value": format_rounded(entry.value, decimals=entry.decimals),
-            "interval": interval_words(entry.interval, decimals=entry.decimals),
-            "rank_range": rank_range(entry).strip("()"),
+            "notes": _notes(entry),
         }
         for entry in _ranked(board)[:N_LEADERS]
     ]
+
+
+def _notes(entry: Entry) -> list[str]:
+    """Say how sure value and rank are; nothing of a published row without an interval."""
+    notes = []
+    interval = interval_words(entry.interval, decimals=entry.decimals)
+    if interval:
+        notes.append(f"95% CI {interval}")
+    elif entry.kind != "published":
+        notes.append("no confidence interval")
+    ranks = rank_range(entry).strip("()")
+    if ranks:
+        notes.append(f"rank range {ranks}")
+    return notes
 
 
 def _ranked(board: Board) -> list[Entry]:

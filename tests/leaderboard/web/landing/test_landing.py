@@ -1,11 +1,14 @@
 """The landing page: what time to contact is, who leads and how surely, and where to go from there."""
 
 import json
+import re
 from datetime import timedelta
 
+import msgspec
 from django.conf import settings
 from django.test import Client
 from django.utils import timezone
+from pytest_django.fixtures import Settings
 
 from leaderboard.models import Edition, PublishedResult, Split, Submission, User
 from leaderboard.web.landing.landing_views import main_split
@@ -47,6 +50,25 @@ def test_each_ttc_range_names_its_leaders_and_their_value(client: Client, benchm
     ]
 
 
+def test_a_leader_has_its_interval_or_says_that_it_has_none_and_a_quoted_one_has_neither(
+    client: Client, edition: Edition, owner: User, open_values: None
+) -> None:
+    assert _notes(client)[0] == []
+    PublishedResult.objects.all().delete()
+    for factor in (1.01, 2.0):
+        builders.submit(owner, builders.predictions(edition, factor=factor), method=f"Times {factor}")
+    builders.score_all()
+    assert _notes(client) == [["no confidence interval"]] * 2
+    builders.infer_all()
+    assert all(re.fullmatch(r"95% CI [\d.]+ to [\d.]+", notes[0]) for notes in _notes(client))
+
+
+def _notes(client: Client) -> list[list[str]]:
+    """What stands below the value of each leader."""
+    rows = landing(client).one("ol", class_="leaders").all("li")
+    return [[note.text for note in row.one("div", class_="value").all("p", class_="quiet")] for row in rows]
+
+
 def _range_rows(client: Client) -> list[pages.Element]:
     return panel(client, "leaders").one("table").one("tbody").all("tr")
 
@@ -81,6 +103,10 @@ def test_its_one_filled_button_leads_to_a_split_that_is_open(client: Client, edi
     builders.board_changed("test")
     (button,) = filled_buttons(client)
     assert (button.text, button.attributes["href"]) == ("Try a submission (demo)", "/submit/?split=demo")
+    Split.objects.filter(pk="demo").update(is_simulated=False)
+    builders.board_changed("demo")
+    (button,) = filled_buttons(client)
+    assert button.text == "Submit to Demo"
     Split.objects.filter(pk="demo").update(current_edition=None)
     builders.board_changed("demo")
     assert filled_buttons(client) == []
@@ -231,3 +257,14 @@ def test_search_engines_learn_what_the_dataset_is(client: Client, benchmark: Non
         "TSTTC, Demo",
     ]
     assert dataset["hasPart"][1]["url"].endswith("/board/val/")
+
+
+def test_search_engines_read_names_as_they_are_written(
+    client: Client, benchmark: None, settings: Settings
+) -> None:
+    paper = msgspec.structs.replace(settings.BENCHMARK.paper, authors=("A. O'Brien", "B. <Bee> & Sons"))
+    settings.BENCHMARK = msgspec.structs.replace(settings.BENCHMARK, paper=paper)
+    (script,) = pages.get(client, "/").all("script", type="application/ld+json")
+    dataset = json.loads(script.raw_text)
+    assert [each["name"] for each in dataset["creator"]] == ["A. O'Brien", "B. <Bee> & Sons"]
+    assert dataset["citation"].startswith(f"A. O'Brien, B. <Bee> & Sons ({paper.year}). {paper.title}. ")
