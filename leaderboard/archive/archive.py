@@ -20,6 +20,7 @@ from leaderboard.api.serializers import BoardSerializer, absolute
 from leaderboard.backups import contents, database
 from leaderboard.backups.contents import NoBackup
 from leaderboard.boards import listing, snapshots
+from leaderboard.boards.rows import Entry
 from leaderboard.exports import tables
 from leaderboard.models import Edition, Split, Submission, Visibility
 from leaderboard.pages import texts
@@ -79,10 +80,12 @@ def _board(split: Split, edition: Edition | None, written: dict[str, bytes]) -> 
             name = f"{archives.RECEIPTS}/{entry.submission_id}-edition-{edition.number}.jwt"
             submission = Submission.objects.select_related("method").get(pk=entry.submission_id)
             written[name] = receipts.receipt(submission=submission, edition_number=edition.number).encode()
-        rows.append((row, entry, name))
+        rows.append((row, entry, _about(row, entry), name))
     return {
         "split": split,
         "edition": edition,
+        "is_current": edition == split.current_edition,
+        "title": f"{split.title}, edition {edition.number}" if edition else split.title,
         "about": layouts.about(export.origin),
         "links": links,
         "groups": [(metric.heading, len(names)) for metric, names in grouped_names(export.scores).items()],
@@ -90,6 +93,12 @@ def _board(split: Split, edition: Edition | None, written: dict[str, bytes]) -> 
         "rows": rows,
         "has_intervals": any(entry.intervals for entry in shown),
     }
+
+
+def _about(row: layouts.Row, entry: Entry) -> str:
+    """Say whose row it is, of when, and whether a paper has it."""
+    source = "quoted" if entry.kind == "published" else ""
+    return ", ".join(filter(None, (row.team, entry.date_text, source)))
 
 
 def _texts(papers: Sequence[published.PrintedTable], now: datetime) -> dict[str, bytes]:

@@ -14,7 +14,7 @@ from evaluator import archives
 from leaderboard.models import Edition, Method, Split, Submission, User
 from leaderboard.models.benchmark import Listing
 from leaderboard.submissions import intake
-from tests import builders
+from tests import builders, pages
 from tests.editions import corrected, open_edition, publish
 
 # PostgreSQL reads an archive as of one moment, for which a transaction must begin with it.
@@ -105,6 +105,19 @@ def test_the_index_loads_nothing_from_other_hosts(methods: dict[str, Submission]
     assert not re.search(r"<script|<img|style=|@import|<iframe", index)
     assert re.findall(r'rel="stylesheet" href="([^"]+)"', index) == ["site.css", "index.css"]
     assert b"url(" not in files["site.css"] + files["index.css"]
+
+
+def test_a_row_of_the_index_says_its_team_and_date_and_links_its_sources(
+    benchmark: None, methods: dict[str, Submission], tmp_path: Path
+) -> None:
+    index = pages.read(archived(tmp_path)["index.html"].decode())
+    boards = {each.attributes["aria-label"]: each for each in index.all("div", role="region")}
+    own, quoted = (
+        {name.text for name in boards[title].all("th", scope="row")}
+        for title in ("Board of Test, edition 1", "Board of Validation")
+    )
+    assert f"Offenbach Owls, {timezone.now():%Y-%m-%d} receipt" in own
+    assert "Deep Scale Shi et al., 2023, quoted paper code" in quoted
 
 
 @pytest.mark.parametrize("name", [".hidden", "thesis.tex"])
