@@ -1,19 +1,35 @@
 """The audit log as maintainers look through it and take it along."""
 
+import ast
 import json
+import re
 from dataclasses import replace
 from datetime import UTC, timedelta
 from io import StringIO
+from pathlib import Path
 
 import pytest
 from django.core.management import CommandError, call_command
 from django.http import HttpResponseBase, StreamingHttpResponse
 from django.test import Client
 
+import leaderboard
 from leaderboard import audit
 from leaderboard.editions import policy
-from leaderboard.models import AuditEvent, Edition, Split, Submission, User
+from leaderboard.models import (
+    AuditEvent,
+    Edition,
+    GroundTruth,
+    Method,
+    Publication,
+    Split,
+    Status,
+    Submission,
+    Team,
+    User,
+)
 from leaderboard.people import teams
+from leaderboard.web.maintain import audit_tables
 from tests import builders, pages
 from tests.leaderboard.web.test_every_page import assert_sound
 
@@ -257,3 +273,69 @@ def test_a_closed_account_is_no_maintainers_and_a_role_needs_a_reason(owner: Use
 
 
 # --- nothing that is nobody's business -------------------------------------------------------------------
+
+
+# --- every action has its words -----------------------------------------------------------------------------
+
+# Verbs that the code makes of something else.
+MADE: dict[str, set[str]] = {
+    "kind.lower()": {kind.lower() for kind in Publication.Kind.values},
+    "outcome.status.lower()": {Status.SCORED.lower(), Status.REJECTED.lower()},
+    "verb": set(),  # of what the same file gives this name
+}
+
+
+def written() -> tuple[set[str], set[str]]:
+    """Return the verbs and the nouns that the source writes into the audit log."""
+    verbs: set[str] = set()
+    nouns: set[str] = set()
+    folder = Path(leaderboard.__file__).parent
+    for path in sorted(folder.rglob("*.py")):
+        if path.name == "audit.py":  # passes on what it is given
+            continue
+        tree = ast.parse(path.read_text())
+        for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+            function = ast.unparse(call.func)
+            named = {word.arg: word.value for word in call.keywords}
+            if function == "audit.record":
+                verbs |= texts_of(named["verb"], tree)
+                nouns |= texts_of(named["noun"], tree)
+            elif function == "audit.record_of":
+                verbs |= texts_of(call.args[1], tree)
+            elif function == "audit.record_many":
+                [rows] = [node for node in ast.walk(call) if isinstance(node, ast.GeneratorExp)][:1]
+                assert isinstance(rows.elt, ast.Tuple)
+                first = rows.elt.elts[0]
+                verbs |= texts_of(first.value.elts[0] if isinstance(first, ast.Starred) else first, tree)  # type: ignore[attr-defined]
+    return verbs, nouns
+
+
+def texts_of(value: ast.expr, tree: ast.Module) -> set[str]:
+    """Return the texts that an expression may be. Fails for one that nobody has told of here."""
+    if isinstance(value, ast.Constant):
+        return {value.value}
+    if isinstance(value, ast.IfExp):
+        return texts_of(value.body, tree) | texts_of(value.orelse, tree)
+    texts = set(MADE[ast.unparse(value)])
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == ast.unparse(value):
+            texts |= texts_of(node.value, tree)
+    return texts
+
+
+def test_every_verb_that_the_code_writes_has_words_of_its_own_and_none_has_words_in_vain() -> None:
+    verbs, nouns = written()
+    assert len(verbs) > 40
+    assert verbs == set(audit_tables._VERBS)
+    for verb in verbs:
+        assert re.fullmatch("[a-z][a-z -]+", audit_tables.verb_words(verb)), verb
+    for noun in nouns | {model.__name__ for model in (Team, User, Method, Edition, Split, GroundTruth)}:
+        assert re.fullmatch("[A-Z]+[a-z ]+[a-z]", audit_tables.noun_words(noun)), noun
+
+
+def test_the_page_shows_every_verb_with_its_words(keeper: Client) -> None:
+    verbs, _ = written()
+    for number, verb in enumerate(sorted(verbs)):
+        audit.record(verb=verb, noun="Door", noun_id=number)
+    shown = [row[3] for page in (1, 2) for row in rows(keeper.get(f"{PAGE}?page={page}"))][: len(verbs)]
+    assert sorted(shown) == sorted(audit_tables.verb_words(verb) for verb in verbs)
