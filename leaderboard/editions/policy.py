@@ -9,6 +9,7 @@ from django.core.exceptions import ValidationError
 from django.db import transaction
 
 from leaderboard import audit, board_versions
+from leaderboard.editions.deadlines import formatted
 from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
 from leaderboard.models import PageVersion, Split, User
 from leaderboard.models.benchmark import NO_END, NO_TEXT, Listing
@@ -54,6 +55,9 @@ FIRST_POLICY: Final = Policy(title="", listing=Listing.OFF, **HIDDEN_QUOTA)
 """What the form of a new split begins with: on no page, and the quota of hidden ground truth."""
 
 
+FAR_AWAY: Final = timedelta(days=365)
+
+
 def policy_of(split: Split) -> Policy:
     return Policy(**{name: getattr(split, name) for name in NAMES})
 
@@ -82,6 +86,39 @@ def change(*, split_name: str, policy: Policy, actor: User | None) -> Split:
             )
             board_versions.bump(split.pk)
     return split
+
+
+def doubtful_dates(before: Policy | None, after: Policy, *, now: datetime) -> tuple[str, ...]:
+    """Return what to ask of dates that are new, since a wrong year is easily typed; one sentence for each.
+
+    `before` None is a new split.
+    """
+    new = {name: at for name, at in vars(after).items() if before is None or at != getattr(before, name)}
+    opens_at, closes_at, ends_at = (
+        new.get(name) for name in ("opens_at", "closes_at", "announcement_ends_at")
+    )
+    was_open = before is not None and (before.opens_at is None or before.opens_at <= now)
+    asked = (
+        (_is_past(closes_at, now), closes_at, "Submissions close at once: {} is in the past."),
+        (_is_far(closes_at, now), closes_at, "Submissions are open for more than a year, until {}."),
+        (_is_far(opens_at, now), opens_at, "Submissions open in more than a year, at {}."),
+        (was_open and _is_near(opens_at, now), opens_at, "Submissions are closed from now until {}."),
+        (_is_past(ends_at, now), ends_at, "The announcement is not shown: {} is in the past."),
+        (_is_far(ends_at, now), ends_at, "The announcement is shown for more than a year, until {}."),
+    )
+    return tuple(sentence.format(formatted(at)) for is_doubtful, at, sentence in asked if is_doubtful)
+
+
+def _is_past(at: datetime | None, now: datetime) -> bool:
+    return at is not None and at <= now
+
+
+def _is_far(at: datetime | None, now: datetime) -> bool:
+    return at is not None and at > now + FAR_AWAY
+
+
+def _is_near(at: datetime | None, now: datetime) -> bool:
+    return at is not None and now < at <= now + FAR_AWAY
 
 
 def announce(*, text: str, ends_at: datetime | None, now: datetime, actor: User | None) -> None:

@@ -1,6 +1,7 @@
 """The base of all forms."""
 
-from collections.abc import Iterator
+import hashlib
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, Self
 from urllib.parse import urlencode
@@ -61,6 +62,23 @@ class SiteForm(forms.Form):
         """Return the values as a query, with `more`."""
         asked = {**self.cleaned_data, **more}
         return urlencode({name: str(value) for name, value in asked.items() if value})
+
+
+class AskingForm(SiteForm):
+    """A form that may ask before it does what it is for: `sentences` is the question, once it was sent."""
+
+    confirmed = forms.CharField(required=False, widget=forms.HiddenInput())
+    sentences: Sequence[str] = ()
+
+    @property
+    def answer(self) -> str:
+        """Return what confirms these sentences alone."""
+        return hashlib.sha256("\0".join(self.sentences).encode()).hexdigest()[:32]
+
+    def asks(self, sentences: Sequence[str]) -> bool:
+        """Tell whether these sentences are to be confirmed first."""
+        self.sentences = sentences
+        return bool(sentences) and self.cleaned_data["confirmed"] != self.answer
 
 
 def confirmation() -> forms.BooleanField:

@@ -23,7 +23,7 @@ from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, Status
 from leaderboard.pages import texts
 from leaderboard.web.boards import edition_tables, tables
 from leaderboard.web.decorators import asks_first
-from leaderboard.web.forms import SiteForm
+from leaderboard.web.forms import AskingForm, SiteForm
 from leaderboard.web.maintain import preview_tables, queue_tables, site_state
 from leaderboard.web.maintain.maintainer_forms import (
     DiscardForm,
@@ -230,4 +230,7 @@ def _effects(row: Edition) -> dict[str, Any]:
 
 
 def form_page(request: HttpRequest, template: str, form: SiteForm, **context: Any) -> HttpResponse:
-    return render(request, template, {"form": form, **context}, status=422 if form.errors else 200)
+    """Show a form: for the first time, with its errors, or with what it asks."""
+    is_asking = isinstance(form, AskingForm) and bool(form.sentences)
+    status = 422 if form.errors or is_asking else 200
+    return render(request, template, {"form": form, **context}, status=status)

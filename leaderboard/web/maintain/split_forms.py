@@ -25,7 +25,7 @@ from leaderboard.errors.refusals import Refused
 from leaderboard.models import Split
 from leaderboard.models.benchmark import Listing
 from leaderboard.quotas.spans import span
-from leaderboard.web.forms import SiteForm
+from leaderboard.web.forms import AskingForm
 from leaderboard.web.maintain.quota_forms import QuotaRulesForm
 
 _ZONE: Final = "Add the time zone: UTC, AoE or +01:00."
@@ -76,7 +76,7 @@ class MomentField(forms.CharField):
             raise forms.ValidationError(str(refusal)) from refusal
 
 
-class PolicyForm(QuotaRulesForm):
+class PolicyForm(AskingForm, QuotaRulesForm):
     """The fields of `Policy`."""
 
     title = forms.CharField(
@@ -221,7 +221,7 @@ class NewSplitForm(PolicyForm):
         }
 
 
-class AnnouncementForm(SiteForm):
+class AnnouncementForm(AskingForm):
     """The arguments of `policy.announce`."""
 
     announcement = forms.CharField(

@@ -1,5 +1,7 @@
 """Splits for maintainers: list, new split, policy, announcements."""
 
+from datetime import datetime
+
 from django import forms
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
@@ -9,6 +11,7 @@ from django.views.decorators.http import require_safe
 
 from evaluator.counting import counted
 from leaderboard.editions import deadlines, new_splits, policy
+from leaderboard.editions.policy import Policy
 from leaderboard.mails import announcements
 from leaderboard.mails.announcements import Announcement
 from leaderboard.models import PageVersion, Split
@@ -45,9 +48,10 @@ def splits(request: HttpRequest) -> HttpResponse:
 @maintainers_form
 def add(request: HttpRequest) -> HttpResponse:
     form = NewSplitForm.asked(request, initial=NewSplitForm.first_values())
-    if form.is_valid():
+    now = timezone.now()
+    if form.is_valid() and not form.asks(policy.doubtful_dates(None, form.policy(), now=now)):
         with form.refusals():
-            split = new_splits.add_split(now=timezone.now(), actor=maintainer_of(request), **form.wanted())
+            split = new_splits.add_split(now=now, actor=maintainer_of(request), **form.wanted())
             messages.success(request, f"{split.title} was added.")
             return redirect("maintain_splits")
     return form_page(request, "maintain/split_form.html", form)
@@ -56,9 +60,10 @@ def add(request: HttpRequest) -> HttpResponse:
 @maintainers_form
 def change(request: HttpRequest, split: str) -> HttpResponse:
     split_row = get_object_or_404(Split, pk=split)
-    form = PolicyForm.asked(request, initial=PolicyForm.filled_with(policy.policy_of(split_row)))
+    before = policy.policy_of(split_row)
+    form = PolicyForm.asked(request, initial=PolicyForm.filled_with(before))
     form.is_hidden = split_row.is_hidden
-    if form.is_valid():
+    if form.is_valid() and not form.asks(policy.doubtful_dates(before, form.policy(), now=timezone.now())):
         with form.refusals():
             policy.change(split_name=split, policy=form.policy(), actor=maintainer_of(request))
             messages.success(request, f"{split_row.title} was changed.")
@@ -75,7 +80,7 @@ def announcement(request: HttpRequest) -> HttpResponse:
         else {}
     )
     form = AnnouncementForm.asked(request, initial=initial)
-    if form.is_valid():
+    if form.is_valid() and not form.asks(_doubts(current, form.cleaned_data["announcement_ends_at"])):
         with form.refusals():
             text, ends_at = form.cleaned_data["announcement"], form.cleaned_data["announcement_ends_at"]
             policy.announce(text=text, ends_at=ends_at, now=timezone.now(), actor=maintainer_of(request))
@@ -83,6 +88,14 @@ def announcement(request: HttpRequest) -> HttpResponse:
             return redirect("maintain_splits")
     is_shown = current is not None and current.ends_at is not None and current.ends_at > timezone.now()
     return form_page(request, "maintain/announcement.html", form, current=current if is_shown else None)
+
+
+def _doubts(current: PageVersion | None, ends_at: datetime | None) -> tuple[str, ...]:
+    """Return what to ask of the end of the site's announcement, as of a split's."""
+    now, before = timezone.now(), Policy(title="", announcement_ends_at=current.ends_at if current else None)
+    if ends_at is not None and ends_at <= now:
+        return ()  # it is refused
+    return policy.doubtful_dates(before, Policy(title="", announcement_ends_at=ends_at), now=now)
 
 
 class MailForm(SiteForm):

@@ -43,6 +43,12 @@ PUBLIC = (
 )
 
 
+def post_confirmed(keeper: Client, address: str, form: dict[str, str]) -> Any:
+    """Send a form, and answer yes to what it asks."""
+    asked = pages.page(keeper.post(address, form)).one("input", name="confirmed")
+    return keeper.post(address, {**form, "confirmed": asked.attributes["value"]})
+
+
 def change(name: str, **values: Any) -> Split:
     wanted = Policy(**{**vars(policy.policy_of(Split.objects.get(pk=name))), **values})
     return policy.change(split_name=name, policy=wanted, actor=None)
@@ -147,10 +153,10 @@ def filled_in(page: pages.Element) -> dict[str, str]:
 def test_split_without_ground_truth_cannot_be_listed(
     keeper: Client, edition: Edition, tmp_path: Path
 ) -> None:
-    answer = keeper.post(ADD, NEW | {"truth": "hidden"})
+    answer = post_confirmed(keeper, ADD, NEW | {"truth": "hidden"})
     assert answer.status_code == 422
     assert "has no ground truth and would be listed" in pages.page(answer).one("main").text
-    assert keeper.post(ADD, NEW | {"truth": "hidden", "listing": "OFF"}).status_code == 302
+    assert post_confirmed(keeper, ADD, NEW | {"truth": "hidden", "listing": "OFF"}).status_code == 302
     with pytest.raises(Refused, match="has no ground truth and would be listed") as refused:
         change("challenge-2027", listing="LISTED")
     assert refused.value.field == "listing"
@@ -167,7 +173,7 @@ def own_score(board: dict[str, Any]) -> float:
 def test_page_adds_a_challenge_and_says_what_is_wrong_at_the_field(keeper: Client, edition: Edition) -> None:
     last = max(Split.objects.values_list("position", flat=True))
     assert filled_in(assert_sound(keeper.get(ADD)))["position"] == str(last + 1)
-    answer = keeper.post(ADD, NEW)
+    answer = post_confirmed(keeper, ADD, NEW)
     assert (answer.status_code, answer.headers["Location"]) == (302, SPLITS)
     made = Split.objects.get(pk="challenge-2027")
     assert made.closes_at == datetime(2099, 3, 2, 11, 59, tzinfo=UTC)
@@ -180,13 +186,12 @@ def test_page_adds_a_challenge_and_says_what_is_wrong_at_the_field(keeper: Clien
         ("name", "challenge-2027", "There is a split 'challenge-2027' already"),
         ("name", "audit", "and none of actions, add, announcement"),
         ("title", "", "No title was given"),
-        ("closes_at", "2020-01-01 00:00 UTC", "is in the past"),
         ("opens_at", "2099-03-01 10:00", "has no time zone"),
         ("quota_window", "-3 days", "'-3 days' is not a span of time"),
         ("position", "99999", "expected a whole number from 0 to 32,767."),
         ("quota_rejected_limit", str(10**12), "expected at most 1,000,000, or none."),
     ):
-        refused = keeper.post(ADD, {**NEW, "name": "other", field: value})
+        refused = keeper.post(ADD, {**NEW, "closes_at": "", "name": "other", field: value})
         assert refused.status_code == 422, field
         wrong = assert_sound(refused).one("div", class_="wrong")
         assert sentence in wrong.text
@@ -226,6 +231,107 @@ def test_page_changes_a_policy_and_the_audit_trail_has_both_values(keeper: Clien
     assert event.details["title"] == "Test → Test set"
     assert set(event.details) == {"title", "description", "quota_limit"}
     assert "Test set" in keeper.get("/board/test/").text
+
+
+NOW = timezone.now().replace(second=0, microsecond=0)
+DAY, YEAR = timedelta(days=1), timedelta(days=366)
+DOUBTFUL = [
+    ({"closes_at": NOW - YEAR}, ["Submissions close at once: {closes_at} is in the past."]),
+    ({"closes_at": NOW - 2 * DAY}, ["Submissions close at once: {closes_at} is in the past."]),
+    ({"closes_at": NOW + 36 * YEAR}, ["Submissions are open for more than a year, until {closes_at}."]),
+    ({"opens_at": NOW + DAY}, ["Submissions are closed from now until {opens_at}."]),
+    (
+        {"opens_at": NOW + 2 * YEAR, "closes_at": NOW + 3 * YEAR},
+        [
+            "Submissions are open for more than a year, until {closes_at}.",
+            "Submissions open in more than a year, at {opens_at}.",
+        ],
+    ),
+    (
+        {"announcement": "Soon", "announcement_ends_at": NOW - DAY},
+        ["The announcement is not shown: {announcement_ends_at} is in the past."],
+    ),
+    (
+        {"announcement": "Soon", "announcement_ends_at": NOW + 2 * YEAR},
+        ["The announcement is shown for more than a year, until {announcement_ends_at}."],
+    ),
+]
+
+
+def as_typed(values: dict[str, Any]) -> dict[str, str]:
+    return {
+        name: deadlines.formatted(value) if isinstance(value, datetime) else value
+        for name, value in values.items()
+    }
+
+
+@pytest.mark.parametrize(("values", "questions"), DOUBTFUL)
+@pytest.mark.parametrize("name", ["test", "val"])
+def test_a_date_of_another_year_is_asked_about_and_nothing_is_changed_before_the_answer(
+    keeper: Client, edition: Edition, name: str, values: dict[str, Any], questions: list[str]
+) -> None:
+    address, before = f"{SPLITS}{name}/", [policy.policy_of(split) for split in Split.objects.order_by("pk")]
+    typed = as_typed(values)
+    form = {**filled_in(get(keeper, address)), **typed}
+    for wrong_answer in ({}, {"confirmed": "yes"}):
+        page = assert_sound(keeper.post(address, form | wrong_answer))
+        asked = page.one("div", class_="question").text
+        for question in questions:
+            assert question.format(**typed) in asked
+        assert filled_in(page)["title"] == form["title"], "what was typed is still there"
+    assert [policy.policy_of(split) for split in Split.objects.order_by("pk")] == before
+    assert post_confirmed(keeper, address, form).status_code == 302
+    changed = policy.policy_of(Split.objects.get(pk=name))
+    assert {field: getattr(changed, field) for field in values} == values
+    # What is there already is no news.
+    again = {**filled_in(get(keeper, address)), "title": "Another title"}
+    assert keeper.post(address, again).status_code == 302
+
+
+def test_an_answer_is_about_the_date_that_was_asked_about(keeper: Client, edition: Edition) -> None:
+    address = f"{SPLITS}test/"
+    form = {**filled_in(get(keeper, address)), "closes_at": "2020-01-01 00:00 UTC"}
+    answer = pages.page(keeper.post(address, form)).one("input", name="confirmed").attributes["value"]
+    other = form | {"closes_at": "2021-01-01 00:00 UTC", "confirmed": answer}
+    assert "2021-01-01 00:00 UTC is in the past" in keeper.post(address, other).text
+    assert Split.objects.get(pk="test").closes_at is None
+
+
+def test_a_date_within_a_year_is_saved_at_once(keeper: Client, edition: Edition) -> None:
+    for name, days in (("test", 1), ("val", 364)):
+        form = filled_in(get(keeper, f"{SPLITS}{name}/")) | as_typed({"closes_at": NOW + days * DAY})
+        assert keeper.post(f"{SPLITS}{name}/", form).status_code == 302
+
+
+def test_a_new_split_and_the_announcement_of_the_site_ask_as_well(keeper: Client, edition: Edition) -> None:
+    for closes_at in ("2020-01-01 00:00 UTC", "2099-01-01 00:00 UTC"):
+        page = assert_sound(keeper.post(ADD, NEW | {"closes_at": closes_at}))
+        assert closes_at in page.one("div", class_="question").text
+    assert not Split.objects.filter(pk="challenge-2027").exists()
+    address = "/maintain/announcement/"
+    form = {"announcement": "Maintenance", "announcement_ends_at": "2099-01-01 00:00 UTC"}
+    assert (
+        "for more than a year" in assert_sound(keeper.post(address, form)).one("div", class_="question").text
+    )
+    assert PageVersion.announcement().count() == 0
+    assert post_confirmed(keeper, address, form).status_code == 302
+    assert PageVersion.announcement().count() == 1
+
+
+def test_the_end_of_one_split_leaves_the_other_open(
+    keeper: Client, edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    val = builders.import_truth(tmp_path, split="val")
+    form = filled_in(get(keeper, f"{SPLITS}test/")) | as_typed({"closes_at": NOW - DAY})
+    assert post_confirmed(keeper, f"{SPLITS}test/", form).status_code == 302
+    with pytest.raises(Refused, match="Submissions to Test closed at"):
+        builders.send(owner, builders.predictions(edition))
+    assert builders.send(owner, builders.predictions(val), split="val").is_new
+    builders.score_all()
+    open_by_split = {row["split"]: row["is_open"] for row in keeper.get("/api/v1/splits").json()}
+    assert (open_by_split["test"], open_by_split["val"]) == (False, True)
+    assert "Closed for submissions" in keeper.get("/board/test/").text
+    assert "Closed for submissions" not in keeper.get("/board/val/").text
 
 
 def test_a_change_that_makes_no_sense_is_refused(benchmark: None) -> None:
@@ -302,7 +408,7 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
         refused = keeper.post(page, sent)
         assert sentence in assert_sound(refused).one("div", class_="wrong").text
     sent = {"announcement": text, "announcement_ends_at": "2099-01-01 00:00 UTC"}
-    assert keeper.post(page, sent).status_code == 302
+    assert post_confirmed(keeper, page, sent).status_code == 302
     for address in ("/", "/board/test/", "/board/val/", "/compare/?split=test"):
         [line] = pages.page(visitor.get(address)).all("p", class_="announcement")
         assert line.text == text
@@ -325,7 +431,8 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
     assert board_versions.bump_passed_deadlines(now=timezone.now()) == 3
     assert "Val only" not in visitor.get("/board/val/").text
     assert {each["announcement"] for each in visitor.get("/api/v1/splits").json()} == {""}
-    assert keeper.post(page, sent | {"announcement": "Known error"}).status_code == 302
+    again = sent | {"announcement": "Known error"}
+    assert post_confirmed(keeper, page, again).status_code == 302
     assert "Known error" in visitor.get("/board/test/").text
     assert keeper.post(page, {}).status_code == 302
     assert not PageVersion.announcement().exists()
