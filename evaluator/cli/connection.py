@@ -33,6 +33,8 @@ TOKENS_INSTEAD = {
     "token-split": "Create a token for that split, or for all splits,",
 }
 UNKNOWN_SPLIT = "unknown-split"  # the server's code
+# Who waits longer than this wants to know for what.
+WORTH_A_LINE_S = 5.0
 
 
 @contextmanager
@@ -64,6 +66,7 @@ def connect(
             timeout_s=min(timeout_s, NETWORK_TIMEOUT_S) if timeout_s else network_timeout_s(),
             user_agent=agent,
             retry_policy=retry_policy,
+            on_wait=_say_wait,
         ) as client:
             if bearer:
                 client.require_leaderboard()
@@ -76,6 +79,12 @@ def connect(
                 raise unknown_split(splits, document=error.document) from error
     except ClientError as error:
         raise in_words(error, url=url) from error
+
+
+def _say_wait(fault: ClientError, delay_s: float) -> None:
+    if delay_s >= WORTH_A_LINE_S:
+        message = printable(in_words(fault, url="").message)
+        click.echo(f"{message}\nTrying again in {duration(delay_s)}.", err=True)
 
 
 def _splits_instead(client: Client, error: Refused) -> list[str]:

@@ -26,6 +26,7 @@ from evaluator.client.answers import (
     Account,
     BadAnswer,
     Board,
+    ClientError,
     Compared,
     Method,
     Quota,
@@ -67,6 +68,8 @@ class Client:
     sleep: Callable[[float], None] = time.sleep
     monotonic_s: Callable[[], float] = time.monotonic
     rng: random.Random = field(default_factory=random.Random)
+    on_wait: Callable[[ClientError, float], None] | None = None
+    """Called with the fault and the seconds to wait, before a request is repeated."""
 
     def __post_init__(self) -> None:
         self.url = self.url.rstrip("/")
@@ -359,4 +362,6 @@ class Client:
                 is_late = self.monotonic_s() + delay_s >= until_s
                 if n_failed >= n_tries or is_lasting or is_late:
                     raise
+                if self.on_wait is not None:
+                    self.on_wait(fault, delay_s)
             self.sleep(delay_s)

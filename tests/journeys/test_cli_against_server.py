@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import json
+import shutil
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner, Result
 from django.utils import timezone
+from pytest_django import Settings
 from pytest_django.live_server_helper import LiveServer
 
+from evaluator.cli import main as cli
+from evaluator.client.api import Client
+from evaluator.client.exchange import RetryPolicy
 from evaluator.metrics.protocol import PROTOCOLS
 from leaderboard.editions import ground_truth
 from leaderboard.models import Submission, User
 from tests import builders
+from tests.evaluator.fake_time import FakeTime
 from tests.journeys.programs import EXAMPLES, Done, Tsttc, command
 
 pytestmark = pytest.mark.slow
@@ -92,3 +101,69 @@ def test_board_shows_published_rows_and_the_owner_s_own(tsttc: Tsttc) -> None:
     errors = [entry["scores"]["rte"] for entry in document["entries"]]
     assert errors == sorted(errors, reverse=True)
     assert tuple(document["entries"][0]["scores"]) == PROTOCOLS["tsttc-2"].score_names
+
+
+def _no_folder(settings: Settings) -> None:
+    shutil.rmtree(settings.FILES_DIR)
+    Path(settings.FILES_DIR).write_text("not a folder")
+
+
+def _silent_bucket(settings: Settings) -> None:
+    options = {"url": "s3://bucket/files?endpoint=http://127.0.0.1:1"}
+    store = {"BACKEND": "leaderboard.storage.s3.S3FileStore", "OPTIONS": options}
+    settings.STORAGES = {**settings.STORAGES, "files": store}
+
+
+@pytest.fixture
+def waiting_costs_nothing(
+    live_server: LiveServer, owner: User, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> FakeTime:
+    """The command in this process, which sleeps in no time."""
+    clock = FakeTime()
+    monkeypatch.setattr("evaluator.client.api.Client", partial(Client, sleep=clock.sleep))
+    monkeypatch.setenv("TSTTC_URL", live_server.url)
+    monkeypatch.setenv("TSTTC_TOKEN", builders.token(owner))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    return clock
+
+
+def submit_here(*more: str) -> Result:
+    arguments = ["submit", str(EXAMPLES / "predictions.json"), "--split", "val", "--method", "Foo++", *more]
+    return CliRunner().invoke(cli, arguments, prog_name="tsttc")
+
+
+@pytest.mark.parametrize("spoil", [_no_folder, _silent_bucket])
+@pytest.mark.parametrize("more", [(), ("--no-check",)])
+def test_a_site_whose_store_is_broken_is_named_with_the_code_of_the_server_and_takes_the_file_later(
+    tsttc: Tsttc,
+    waiting_costs_nothing: FakeTime,
+    settings: Settings,
+    monkeypatch: pytest.MonkeyPatch,
+    spoil: Callable[[Settings], None],
+    more: tuple[str, ...],
+) -> None:
+    monkeypatch.setenv("AWS_ACCESS_KEY_ID", "k")
+    monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "s")
+    storages_before = settings.STORAGES
+    kept = Path(settings.FILES_DIR).with_name("kept")
+    shutil.copytree(settings.FILES_DIR, kept)
+    spoil(settings)
+    for as_json in (False, True):
+        done = submit_here(*more, *(["--json"] if as_json else []))
+        assert done.exit_code == 7
+        # It says at once why it waits.
+        sentence = "The file store does not answer at the moment. Nothing was stored or changed."
+        assert done.stderr.startswith(sentence)
+        assert done.stderr.count("\nTrying again in 30 s.\n") == RetryPolicy().n_tries - 1
+        assert "This is not your fault." in done.stderr
+        if as_json:
+            assert json.loads(done.stdout)["code"] == "store-unavailable"
+        else:
+            assert done.stdout == ""
+    assert not Submission.objects.exists()
+    settings.STORAGES = storages_before
+    if not Path(settings.FILES_DIR).is_dir():
+        Path(settings.FILES_DIR).unlink()
+        shutil.copytree(kept, settings.FILES_DIR)
+    assert submit_here(*more).exit_code == 0
+    assert builders.score_all() == 1

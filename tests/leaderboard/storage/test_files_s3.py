@@ -3,8 +3,11 @@
 import json
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import timedelta
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +23,10 @@ from pytest_django import Settings
 
 from leaderboard.backups import contents
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
+from leaderboard.ops import health
 from leaderboard.storage import files, orphans, ownership, s3
+from leaderboard.upkeep import store_check
+from leaderboard.web.maintain import site_state
 from tests import builders
 from tests.prepared import REPOSITORY, put_sqlite
 from tests.services import environment_of_its_own
@@ -140,6 +146,73 @@ def test_upload_while_the_store_is_away_is_answered_503_and_leaves_no_row(
     assert int(response.headers["Retry-After"]) > 0
     assert "127.0.0.1:1/" not in response.text  # where the store is, is nobody's business
     assert not Submission.objects.exists()
+
+
+def _fault_of_the_store(client: Client) -> tuple[bool, str]:
+    """Whether health says that files can be stored, and what the maintainers' page says."""
+    line = next(line for line in site_state.lines(now=timezone.now()) if line.name == "File store")
+    return health.can_store(now=timezone.now()), " ".join([line.text, *line.reasons])
+
+
+@pytest.mark.parametrize("kind", ["away", "no bucket", "wrong key"])
+def test_the_check_of_a_bucket_names_its_fault_until_it_works_again(
+    stored: s3.S3FileStore,
+    bucket: Any,
+    server: str,
+    settings: Settings,
+    monkeypatch: pytest.MonkeyPatch,
+    client: Client,
+    db: None,
+    kind: str,
+) -> None:
+    monkeypatch.setattr(s3, "CONNECT_TIMEOUT_S", 0.2)
+    store_check.check(now=timezone.now())
+    assert _fault_of_the_store(client)[0]
+    assert _names(bucket) == [], "the check leaves nothing behind"
+    with answering(403, "AccessDenied") as refusing:
+        spoilt = {"away": "http://127.0.0.1:1", "no bucket": server, "wrong key": refusing}[kind]
+        url = at(spoilt)["files"]["OPTIONS"]["url"]
+        options = {"url": url.replace(BUCKET, "another-bucket") if kind == "no bucket" else url}
+        settings.STORAGES = {
+            **settings.STORAGES,
+            "files": {**at(spoilt)["files"], "OPTIONS": options},
+        }
+        for _ in range(2):
+            store_check.check(now=timezone.now())
+    is_well, text = _fault_of_the_store(client)
+    assert not is_well
+    assert "files cannot be stored, 2 times in" in text
+    expected = {"away": "does not answer", "no bucket": "NoSuchBucket", "wrong key": "AccessDenied"}
+    assert expected[kind] in text
+    settings.STORAGES = {**settings.STORAGES, **at(server)}
+    store_check.check(now=timezone.now())
+    assert _fault_of_the_store(client)[0]
+
+
+@contextmanager
+def answering(status: int, code: str) -> Iterator[str]:
+    """The address of a service that refuses everything as S3 does."""
+
+    class Refusing(BaseHTTPRequestHandler):
+        def do_PUT(self) -> None:
+            self.rfile.read(int(self.headers.get("Content-Length", 0)))
+            body = f"<Error><Code>{code}</Code><Message>Refused</Message></Error>".encode()
+            self.send_response(status)
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        do_GET = do_HEAD = do_DELETE = do_PUT  # noqa: N815 - the names that the library calls
+
+        def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 - the library's own name
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Refusing) as running:
+        thread = threading.Thread(target=running.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True)
+        thread.start()
+        yield f"http://127.0.0.1:{running.server_port}"
+        running.shutdown()
+        thread.join()
 
 
 # --- faults are told as a disk would tell them ------------------------------------------------------------
