@@ -108,6 +108,7 @@ WARNING_CODES: Final[dict[str, str]] = {
     "inverse-times": "Values change as inverse times do: probably 1/τ, or logarithms of scale ratios.",
     "wrong-rate": "Values are a fixed factor too large or too small: probably a wrong rate, or areas.",
     "flipped-signs": "Values of one object rise while time passes: probably every sign is wrong.",
+    "one-sign": "All values have one sign: probably the sign was lost.",
     "shuffled-values": "The predictions seem to be in another order than the sequences: probably wrong keys.",
     "unlike-truth": "The predictions do not match the true times, or have the opposite sign.",
     "unlike-recordings": "In some recordings the predictions do not match the true times: probably old keys.",

@@ -38,6 +38,9 @@ SMALL_S: Final = 1.0
 RATIOS: Final = (0.5, 1.5)
 MIN_SHARE_OF_POSITIVE: Final = 0.9
 """Of scale ratios where no value is negative: of times to contact, some always are."""
+MIN_VALUES_OF_BOTH_SIGNS: Final = 500
+MIN_SHARE_OF_ONE_SIGN: Final = 0.999
+"""Of so many values some have the other sign: in good files, at least 10% have."""
 MIN_EQUAL_SHARE: Final = 0.5
 MAX_INFINITE_SHARE: Final = 0.25
 
@@ -75,7 +78,7 @@ def warnings_of(predictions: Predictions) -> list[FileWarning]:
     if not any(warning.code == "constant-values" for warning in warnings):
         warnings += _order_warnings(manifest, ttc_s)
     # Values of another unit or another order have no slope that means anything.
-    return warnings or _slope_warnings(predictions) or _small_warnings(ttc_s)
+    return warnings or _slope_warnings(predictions) or _small_warnings(ttc_s) or _one_sign_warnings(ttc_s)
 
 
 def unit_warnings(ttc_s: Floats) -> list[FileWarning]:
@@ -105,12 +108,15 @@ def _far_warnings(ttc_s: Floats) -> list[FileWarning]:
 
 def _ratio_warnings(ttc_s: Floats) -> list[FileWarning]:
     n = len(ttc_s)
-    n_ratios = int(np.count_nonzero((ttc_s >= RATIOS[0]) & (ttc_s <= RATIOS[1])))
-    share = MIN_SHARE_OF_POSITIVE if (ttc_s > 0).all() else MIN_SHARE
+    has_one_sign = bool((ttc_s > 0).all() or (ttc_s < 0).all())
+    sizes = np.abs(ttc_s) if has_one_sign else ttc_s
+    n_ratios = int(np.count_nonzero((sizes >= RATIOS[0]) & (sizes <= RATIOS[1])))
+    share = MIN_SHARE_OF_POSITIVE if has_one_sign else MIN_SHARE
     if n_ratios < share * n or len(np.unique(ttc_s)) == 1:
         return []
+    bounds, kind = ("0.5 and 1.5", "scale") if ttc_s.max() > 0 else ("-1.5 and -0.5", "the negative of scale")
     message = (
-        f"{n_ratios:,} of {n:,} values lie between 0.5 and 1.5 s; expected few. They are probably scale "
+        f"{n_ratios:,} of {n:,} values lie between {bounds} s; expected few. They are probably {kind} "
         'ratios: these need "unit": "scale_ratio" and fps or frame_gap beside them.'
     )
     return [FileWarning("looks-like-ratios", message)]
@@ -149,6 +155,20 @@ def _small_warnings(ttc_s: Floats) -> list[FileWarning]:
         "probabilities, inverse times (1/τ), logarithms of scale ratios, or scale ratios minus 1."
     )
     return [FileWarning("within-one-second", message)]
+
+
+def _one_sign_warnings(ttc_s: Floats) -> list[FileWarning]:
+    n = len(ttc_s)
+    n_positive = int(np.count_nonzero(ttc_s > 0))
+    n_same = max(n_positive, n - n_positive)
+    if n < MIN_VALUES_OF_BOTH_SIGNS or n_same < MIN_SHARE_OF_ONE_SIGN * n:
+        return []
+    sign, other = ("positive", "negative") if n_same == n_positive else ("negative", "positive")
+    message = (
+        f"{n_same:,} of {n:,} values are {sign}; expected some that are {other}. Probably the sign was lost: "
+        "a time to contact is negative when the object moves away."
+    )
+    return [FileWarning("one-sign", message)]
 
 
 def _slope_warnings(predictions: Predictions) -> list[FileWarning]:

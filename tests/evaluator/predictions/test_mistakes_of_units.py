@@ -72,6 +72,14 @@ MISTAKES: dict[str, tuple[Callable[[Floats], Floats], str, str]] = {
     "ln α at 10 Hz": (lambda ttc_s: np.log(ratios(ttc_s, 10)), "inverse-times", "unlike-truth"),
     "α - 1": (lambda ttc_s: ratios(ttc_s, 2) - 1, "inverse-times", "unlike-truth"),
     "α": (lambda ttc_s: ratios(ttc_s, 2), "looks-like-ratios", "looks-like-ratios"),
+    "100 α": (lambda ttc_s: 100 * ratios(ttc_s, 2), "not-seconds", "not-seconds"),
+    "1 - α": (lambda ttc_s: 1 - ratios(ttc_s, 2), "inverse-times", "unlike-truth"),
+    "degrees": (np.degrees, "not-seconds", "not-seconds"),
+    "ratios at 20 Hz read at 2 Hz": (lambda ttc_s: 10 * ttc_s, "wrong-rate", "wrong-rate"),
+    "ratios at 30 Hz read at 10 Hz": (lambda ttc_s: 3 * ttc_s, "wrong-rate", "wrong-rate"),
+    "ratios at 10 Hz read at 30 Hz": (lambda ttc_s: ttc_s / 3, "wrong-rate", "wrong-rate"),
+    "ratios at 2 Hz read at 30 Hz": (lambda ttc_s: ttc_s / 15, "wrong-rate", "wrong-rate"),
+    "ratios at 10 Hz read at 5 Hz": (lambda ttc_s: 2 * ttc_s, "wrong-rate", "wrong-rate"),
     "α at 10 Hz": (lambda ttc_s: ratios(ttc_s, 10), "looks-like-ratios", "looks-like-ratios"),
     "a constant": (lambda ttc_s: np.full(len(ttc_s), 5.0), "constant-values", "constant-values"),
     "infinities": (
@@ -98,6 +106,27 @@ def test_a_mistake_is_named_with_and_without_the_truth(good: dict[str, File], mi
         file = truth, change(ttc_s)
         assert codes(file) == [without_truth] * bool(without_truth)
         assert codes_with_truth(file) == [with_truth]
+
+
+def test_negative_ratios_are_named_as_such(good: dict[str, File]) -> None:
+    for name in ("the truth", "MiD 15"):
+        truth, ttc_s = good[name]
+        predictions = Predictions.from_arrays(manifest=truth.manifest, ttc_s=-ratios(ttc_s, 2))
+        [warning] = warnings_of(predictions)
+        assert "between -1.5 and -0.5 s" in warning.message
+        assert "the negative of scale ratios" in warning.message
+        assert "looks-like-ratios" in codes_with_truth((truth, predictions.ttc_s))
+
+
+@pytest.mark.parametrize("change", [np.abs, lambda ttc_s: -np.abs(ttc_s), lambda ttc_s: ttc_s.clip(0.1, 10)])
+def test_a_lost_sign_is_warned_of(good: dict[str, File], change: Callable[[Floats], Floats]) -> None:
+    for name in ("the truth", "MiD 15", "MiD 40"):
+        truth, ttc_s = good[name]
+        file = truth, change(ttc_s)
+        assert set(codes(file)) & {"one-sign", "flipped-signs", "wrong-rate"}
+        assert codes_with_truth(file)
+        few = truth.subset(np.arange(300)), change(ttc_s)[:300]
+        assert "one-sign" not in codes(few), "so few objects may all come nearer"
 
 
 def test_probabilities_are_no_seconds() -> None:
