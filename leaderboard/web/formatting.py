@@ -3,6 +3,7 @@
 import re
 from collections.abc import Collection, Iterable
 from datetime import UTC, datetime, time
+from typing import Final
 
 from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
@@ -16,6 +17,9 @@ _TOGETHER = re.compile(
     rf"(?<=\d) to (?=[+−]?\d)|(?<=\d) (?=(?:{_UNITS})\b)|(?<= s) [≤<] τ [≤<] (?=−?\d)|(?<=\bp) [=<≥] (?=\d)"
 )
 
+
+# A line break between tags and texts, with what indents the next line; within a tag it parts attributes.
+_LINE_BREAK: Final = re.compile(r"\n\s*+(?![^<>]*>)")
 
 # Four words or more, with wide gaps between them.
 _COLUMNS = re.compile(r"\S {2,}\S+ {2,}\S+ {2,}\S")
@@ -139,6 +143,17 @@ def jointed(name: str) -> SafeString:
     """Let a long name break after each underscore, as HTML."""
     *parts, last = name.split("_")
     return format_html("{}{}", format_html_join("", "{}_<wbr>", ((part,) for part in parts)), last)
+
+
+def joined(html: str) -> SafeString:
+    """Leave out the line breaks between the pieces of a template, which else would show as spaces.
+
+    A space that shows is written `&#32;`.
+
+    >>> joined("<b\\n  class=x\\n>14.8</b>\\n  <i>best</i>\\n")
+    '<b\\n  class=x\\n>14.8</b><i>best</i>'
+    """
+    return SafeString(_LINE_BREAK.sub("", html))
 
 
 def breakable(path: str) -> SafeString:
