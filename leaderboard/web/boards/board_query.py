@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 from evaluator.counting import counted
 from evaluator.metrics.protocol import known_metrics
 from leaderboard.boards import filters, listing
-from leaderboard.boards.filters import FILTERS, Filters
+from leaderboard.boards.filters import FILTERS, Filter, Filters
 from leaderboard.boards.listing import Board
 from leaderboard.statistics import comparisons
 from leaderboard.web.formatting import grouped
@@ -133,7 +133,13 @@ def tools(
     """
     given = {name: asked.get(name, "").strip() for name in FILTERS}
     fields = [
-        {"name": name, "filter": each, "given": given[name], "fault": faults.get(name, "")}
+        {
+            "name": name,
+            "filter": each,
+            "given": given[name],
+            "fault": faults.get(name, ""),
+            "choices": _choices(each, given[name]),
+        }
         for name, each in FILTERS.items()
         if name != _SEARCH
     ]
@@ -143,7 +149,7 @@ def tools(
             for value, label in (("", "All"), *((each.name, each.symbol) for each in board.rules.metrics))
         ],
         # What is chosen from a list comes before what is typed.
-        "fields": sorted(fields, key=lambda field: not field["filter"].kind.options),
+        "fields": sorted(fields, key=lambda field: not field["choices"]),
         "fault_ids": ",".join(f"#fault-{name}" for name in FILTERS),
         "text": given[_SEARCH],
         "text_fault": faults.get(_SEARCH, ""),
@@ -163,13 +169,19 @@ def tools(
         "has_choices": any(text for name, text in given.items() if name != _SEARCH),
         "sentence": sentence(board, is_filtered=query.filters.is_set),
         "clear_href": query.href(**dict.fromkeys(FILTERS, "")),
-        "address": query.href(page=str(query.page) if query.page > 1 else ""),
+        "address": query.href(page=str(query.page) if query.page > 1 else "").removesuffix("?"),
         # Of an edition's board there is no other time.
         "latest_day": latest_day,
         "kept_but_time": query.kept("sort", "columns", *FILTERS),
         "now_href": query.href(at=""),
         "max_methods": comparisons.MAX_METHODS,
     }
+
+
+def _choices(each: Filter, given: str) -> list[tuple[str, str, bool]]:
+    """Return value, words and whether it is chosen, of each option of a filter; none where one types."""
+    texts = [(option.text.lower(), option.words) for option in each.kind.options]
+    return [(text, words, text == given.lower()) for text, words in texts]
 
 
 def _words(name: str, text: str) -> str:

@@ -1,15 +1,18 @@
 """Pages of a board, now, as of a time, or of one edition, and the list of editions."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date, datetime, timedelta
 from typing import Any
 
+from django.conf import settings
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.utils import timezone
 from django.utils.functional import SimpleLazyObject
 from django.views.decorators.http import require_safe
 
+from evaluator.counting import counted
 from leaderboard.boards import snapshots
 from leaderboard.boards.listing import Board, UnknownColumn
 from leaderboard.boards.snapshots import splits_of
@@ -19,6 +22,7 @@ from leaderboard.quotas import admissions
 from leaderboard.web.boards import board_query, edition_tables, export_views, tables
 from leaderboard.web.boards.board_changes import changed_rows
 from leaderboard.web.boards.board_query import BoardQuery, tools
+from leaderboard.web.boards.legend import legend
 from leaderboard.web.boards.rank_ladder import rank_ladder
 from leaderboard.web.charts import chart_views
 from leaderboard.web.lookups import split_or_404
@@ -43,10 +47,17 @@ def render_board(
     query, faults = board_query.forgiving(request.GET, now=now, has_time=edition is None)
     shown, query = _shown(request, split, edition, query, faults)
     primary = shown.rules.primary.symbol
+    table = tables.board_table(shown, query=query, now=now)
+    is_filtered = query.filters.is_set
     ladder = rank_ladder(shown.unfiltered, primary=shown.rules.score_names[0])
+    ladder_note = ""
+    if ladder:
+        ladder_note = ladder.note(by=primary if table.is_ranked_by_another else "", is_filtered=is_filtered)
     context = {
         "board": shown,
-        "table": tables.board_table(shown, query=query, now=now),
+        **_descriptions(shown, is_of_edition=edition is not None),
+        "table": table,
+        "table_legend": legend(shown, table, ladder=ladder),
         "tools": tools(
             shown,
             query,
@@ -56,17 +67,19 @@ def render_board(
             latest_day=_yesterday(now) if edition is None and split.current_edition else None,
         ),
         "ladder": ladder,
+        "ladder_note": ladder_note,
         "changes": changed_rows(shown),
         "first_publication": _first_publication(shown),
         "exports": export_views.offers(shown, edition, query),
         # Where one can submit instead, and the chart below: of the present board alone.
         "open_splits": []
         if shown.is_open or shown.at
-        else [each for each in splits_of(request) if admissions.is_open(each, now=now)],
+        else _listed([each for each in splits_of(request) if admissions.is_open(each, now=now)]),
         "profile": None
         if shown.at or chart_views.has_progress(shown)
         else chart_views.profile(shown, n_metrics=1 if ladder and not ladder.is_certain else 2),
         "n_profiles": chart_views.n_profiles(shown),
+        "progress_note": _progress_note(shown, is_filtered=is_filtered),
         "progress_label": f"{primary} of each method by date, with the lowest {primary} so far.",
         "n_withdrawn": sum(entry.withdrawn_at is not None for entry in shown.unfiltered),
     }
@@ -95,6 +108,34 @@ def _shown(
     return board, query
 
 
+def _descriptions(board: Board, *, is_of_edition: bool) -> dict[str, str]:
+    """Describe a page to search engines, and its contents to whom its address is sent."""
+    title, benchmark = board.split.title, settings.BENCHMARK.name
+    results = counted(board.n_in_all, "result")
+    if is_of_edition and board.edition:
+        named = f"The {title} board of {benchmark} in edition {board.edition.number}"
+        return {"description": f"{named}, at a permanent address.", "contents": f"{named}: {results}."}
+    metrics = ", ".join(metric.title for metric in board.rules.metrics)
+    edition = f", edition {board.edition.number}" if board.edition else ""
+    return {
+        "description": f"Ranked results on the {title} split of {benchmark}: {metrics}.",
+        "contents": f"{results} on the {title} split of {benchmark}{edition}.",
+    }
+
+
+def _listed(splits: Sequence[Split]) -> list[tuple[Split, str]]:
+    """Return splits, each with what follows it in a sentence."""
+    last = len(splits) - 1
+    separators = {last: "", last - 1: " and"}
+    return [(split, separators.get(i, ",")) for i, split in enumerate(splits)]
+
+
+def _progress_note(board: Board, *, is_filtered: bool) -> str:
+    filtered = ", also those that the filter hides" if is_filtered else ""
+    quoted = ", and rows quoted from papers" if board.n_submissions < board.n_in_all else ""
+    return f"All public submissions to {board.split.title}{filtered}{quoted}."
+
+
 def _yesterday(now: datetime) -> date:
     return (now - timedelta(days=1)).date()
 
@@ -109,7 +150,14 @@ def editions(request: HttpRequest, split: str) -> HttpResponse:
     split_row = split_or_404(request, split)
     log = history.changelog(split_row)
     rows = [(past, edition_tables.past_change(past)) for past in history.history(split_row, log)]
-    context = {"split": split_row, "rows": rows, "changelog": log, "latest_day": _yesterday(timezone.now())}
+    context = {
+        "split": split_row,
+        "description": f"Every edition of the {split_row.title} board of {settings.BENCHMARK.name}, "
+        "with its ground truth, and why each replaced the one before.",
+        "rows": rows,
+        "changelog": log,
+        "latest_day": _yesterday(timezone.now()),
+    }
     return render(request, "boards/editions/editions.html", context)
 
 

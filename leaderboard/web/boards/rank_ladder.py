@@ -20,6 +20,10 @@ class Step(NamedTuple):
     high: int
     drawing: SafeString
 
+    @property
+    def range(self) -> str:
+        return str(self.low) if self.low == self.high else f"{self.low}–{self.high}"
+
 
 class Ladder(NamedTuple):
     """The first methods of a board, the best first, on one scale of ranks."""
@@ -39,6 +43,20 @@ class Ladder(NamedTuple):
     def n_left_out(self) -> int:
         """Methods beyond the first that are drawn."""
         return self.n_ranked - len(self.steps)
+
+    def note(self, *, by: str = "", is_filtered: bool = False) -> str:
+        """Say how many ranks are certain; `by` names the metric where its board shows another one first."""
+        if self.is_certain:
+            certain = "Every rank is certain at 95% confidence."
+        else:
+            metric = f" by {by}" if by else ""
+            certain = (
+                f"{self.n_certain} of {self.n_ranked} ranks with intervals{metric} are certain "
+                "at 95% confidence. If the bars of two methods overlap, their order is not certain."
+            )
+        if is_filtered:
+            return f"{certain} All methods with intervals, also those that the filter hides."
+        return certain
 
 
 def rank_ladder(entries: Iterable[Entry], *, primary: str) -> Ladder | None:

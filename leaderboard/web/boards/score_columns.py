@@ -6,7 +6,6 @@ from functools import cache
 from types import MappingProxyType
 from typing import Final
 
-from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
 from evaluator.metrics.protocol import (
@@ -49,10 +48,15 @@ class Heading:
     metric: str = ""
     axis: SafeString = NOTHING
 
+    @property
+    def below(self) -> str:
+        """Return what stands below the symbol where no group does: the unit, or of a range the metric."""
+        return self.unit if self.is_overall else self.metric
+
 
 @dataclass(frozen=True)
 class Cell:
-    """A number. `css` aligns decimal points."""
+    """A number. `css` has the classes of its column, and aligns decimal points."""
 
     text: str
     css: str = ""
@@ -65,29 +69,26 @@ class Cell:
     has_room: bool = False  # for a whisker: its column has one, though this value may have none
 
     @property
-    def hint(self) -> str:
-        """Return the interval and the mark for hover."""
-        hints = (
-            f"95% confidence interval: {self.interval}" if self.interval else "",
-            MARKED * self.is_with_best,
-        )
-        return "; ".join(filter(None, hints))
+    def interval_hint(self) -> str:
+        """Return the interval for hover; empty where it is not known."""
+        return f"95% confidence interval: {self.interval}" if self.interval else ""
 
     @property
-    def drawn(self) -> SafeString:
-        """Return the table cell; a large board has a thousand, for which a template takes far longer."""
-        text: str = self.text
-        spoken: str = NOTHING
-        if self.is_best or self.is_second:
-            tag, mark = ("strong", "best") if self.is_best else ("u", "second")
-            text = format_html('<{0}>{1}</{0}><span class="spoken"> {2}</span>', tag, text, mark)
+    def hint(self) -> str:
+        """Return the interval and the mark for hover."""
+        if not self.is_with_best:
+            return self.interval_hint
+        return f"{self.interval_hint}; {MARKED}" if self.interval else MARKED
+
+    @property
+    def remarks(self) -> list[str]:
+        """Return what is read aloud after the number: the mark, and the interval that no whisker reads."""
+        remarks = []
         if self.is_with_best:
-            spoken += format_html('<span class="spoken">, {}</span>', MARKED)
+            remarks.append(MARKED)
         if self.interval and not self.whisker:
-            spoken += format_html('<span class="spoken">, {}</span>', self.interval)
-        css = f"{self.css} {self.range_css}" + " with-best" * self.is_with_best
-        title = format_html(' title="{}"', hint) if (hint := self.hint) else NOTHING
-        return format_html('<td class="{}"{}>{}{}</td>', css, title, text, spoken)
+            remarks.append(self.interval)
+        return remarks
 
     @property
     def ends(self) -> list[str]:
@@ -109,6 +110,10 @@ class Group:
     def is_narrow(self) -> bool:
         """Tell whether it has no room for its title."""
         return self.n_columns == 1
+
+    @property
+    def heading(self) -> str:
+        return self.name if self.is_narrow else self.title
 
 
 def ends_of(entry: Entry, name: str) -> whiskers.Ends | None:

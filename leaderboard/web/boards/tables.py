@@ -19,7 +19,7 @@ from leaderboard.methods import details
 from leaderboard.models import Edition
 from leaderboard.statistics import confidence
 from leaderboard.web.boards import whiskers
-from leaderboard.web.boards.board_query import PER_PAGE, BoardQuery
+from leaderboard.web.boards.board_query import ALL_COLUMNS, PER_PAGE, BoardQuery
 from leaderboard.web.boards.score_columns import (
     Cell,
     Group,
@@ -35,6 +35,7 @@ from leaderboard.web.boards.score_columns import (
 from leaderboard.web.boards.whiskers import WhiskerScale
 
 ABSENT: Final = "–"
+MAX_COLUMNS: Final = 11  # of scores that fit; a table with more scrolls in a box of its own
 N_WHOLE_METRICS: Final = 2  # with a column for each TTC range beside each other
 NEW_FOR: Final = timedelta(days=14)
 _WHY_UNSCORABLE: Final = {
@@ -50,6 +51,7 @@ class BoardRow:
     team: str
     cells: tuple[Cell, ...]
     rank_range: str
+    why_no_interval: str  # for hover, at a value without one
     source_number: int | None
     note: str  # why it stays in an earlier edition
     attempts: str
@@ -60,6 +62,28 @@ class BoardRow:
     @property
     def n_moved(self) -> int:
         return abs(self.moved)
+
+    @property
+    def direction(self) -> str:
+        return "up" if self.moved > 0 else "down"
+
+    @property
+    def rank(self) -> str:
+        """Return its rank, in brackets one that it would have; a dash for none."""
+        if self.entry.rank is None:
+            return ABSENT
+        return f"({self.entry.rank})" if self.is_hypothetical else str(self.entry.rank)
+
+    @property
+    def shown_to(self) -> str:
+        """Say to its own team who sees the row and how; empty where everybody sees it as it is."""
+        if not self.entry.is_mine:
+            return ""
+        if self.is_hypothetical:
+            return f"private, would be rank {self.entry.rank}"
+        if not self.entry.is_visible_to_all:
+            return "private"
+        return f"shown as {self.entry.pseudonym}" if self.entry.pseudonym else ""
 
     @property
     def is_hypothetical(self) -> bool:
@@ -103,6 +127,44 @@ class BoardTable:
     can_compare: bool
     reason: str  # why there are no intervals; empty where there are
     floor: str  # what the ground truth itself scores, in words; empty where that is not known
+
+    @property
+    def is_ranked_by_another(self) -> bool:
+        """Tell whether its first metric is not the one that ranks."""
+        return bool(self.rows) and self.groups[0].symbol != self.primary
+
+    @property
+    def is_of_one_metric(self) -> bool:
+        return self.query.columns != ALL_COLUMNS
+
+    @property
+    def is_wide(self) -> bool:
+        """Tell whether it has more columns than fit a page."""
+        return len(self.score_headings) > MAX_COLUMNS
+
+    @property
+    def name_headings(self) -> list[Heading]:
+        """Return the headings in the column of the names."""
+        return [heading for name, heading in self.text_headings.items() if name != "rank"]
+
+    @property
+    def order_of_names(self) -> str:
+        """Return the order of the column of the names; empty where rows are sorted by another."""
+        return "".join(heading.aria_sort for heading in self.name_headings)
+
+    @property
+    def after_unit(self) -> str:
+        """Return what the heads of metrics say of the intervals in their columns."""
+        if not self.has_intervals or self.has_one_whisker:
+            return ""
+        return ", 95% CI, log scale" if self.is_log else ", 95% CI"
+
+    @property
+    def whisker_heading(self) -> str:
+        """Name the one column of whiskers."""
+        interval = ", 95% CI" if self.has_intervals else ""
+        scale = ", log" if self.is_log else ""
+        return f"{self.primary}{interval}{scale}"
 
     @property
     def is_narrow(self) -> bool:
@@ -155,6 +217,7 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
             rank_range=rank_range(entry),
             team=team_of(entry),
             cells=score_cells(entry, names=names, scales=scales),
+            why_no_interval=_why_no_interval(entry, edition),
             source_number=numbers.get(entry.source),
             note=_note(entry, board.split.current_edition),
             attempts=_attempts(entry),
@@ -209,6 +272,14 @@ def _new_among(entries: Sequence[Entry], *, today: date) -> frozenset[UUID]:
         if today - entry.listed_at.date() < NEW_FOR
     )
     return new if 2 * len(new) <= len(entries) else frozenset()
+
+
+def _why_no_interval(entry: Entry, edition: Edition | None) -> str:
+    if entry.source or edition is None:
+        return "No confidence interval: papers do not report values per recording"
+    if entry.withdrawn_at:
+        return "Withdrawn"
+    return f"No confidence interval: too few {edition.unit_noun}s, or too few with an error"
 
 
 def _note(entry: Entry, present: Edition | None) -> str:

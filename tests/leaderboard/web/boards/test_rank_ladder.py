@@ -50,3 +50,23 @@ def test_a_long_board_says_how_many_methods_are_left_out() -> None:
     assert ladder is not None
     assert (len(ladder.steps), ladder.n_left_out) == (MAX_STEPS, 2)
     assert ladder.is_certain, "also of those left out"
+
+
+def test_note_of_a_ladder_counts_the_certain_ranks_and_names_the_metric_where_asked() -> None:
+    ladder = rank_ladder([entry(1, 1, 1), entry(2, 2, 3), entry(3, 2, 3)], primary="mid")
+    assert ladder is not None
+    assert ladder.note() == (
+        "1 of 3 ranks with intervals are certain at 95% confidence. "
+        "If the bars of two methods overlap, their order is not certain."
+    )
+    assert ladder.note(by="MiD").startswith("1 of 3 ranks with intervals by MiD are certain")
+    assert ladder.note(is_filtered=True).endswith(
+        "not certain. All methods with intervals, also those that the filter hides."
+    )
+    assert [step.range for step in ladder.steps] == ["1", "2–3", "2–3"]
+
+
+def test_note_of_a_ladder_whose_ranks_are_all_certain_is_one_sentence() -> None:
+    ladder = rank_ladder([entry(1, 1, 1), entry(2, 2, 2)], primary="mid")
+    assert ladder is not None
+    assert ladder.note(by="MiD") == "Every rank is certain at 95% confidence."
