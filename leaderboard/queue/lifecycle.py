@@ -295,7 +295,8 @@ def release_expired(*, rng: random.Random) -> int:
                 overran=Q(leased_until__gte=F("deadline_at"))
             )
         )
-        for evaluation in expired:
+        # All sweeps lock the counters of the two kinds of strikes in one order.
+        for evaluation in sorted(expired, key=lambda row: row.overran):
             overran: bool = evaluation.overran
             _strike(
                 evaluation,

@@ -13,8 +13,9 @@ from django.utils import timezone
 
 from leaderboard.editions import ground_truth
 from leaderboard.methods import visibility
-from leaderboard.models import Edition, Submission, User
+from leaderboard.models import Edition, Fault, Submission, User
 from leaderboard.moderation import forgetting
+from leaderboard.ops import faults
 from leaderboard.people import invitations, teams, tokens
 from leaderboard.queue import lifecycle
 from leaderboard.statistics import confidence
@@ -124,6 +125,31 @@ def test_what_once_waited_for_each_other_for_ever_does_not(
         outcome = meet(verbs[first], verbs[second], at=lambda number, sql: last in sql)
     assert outcome.was_paused
     assert outcome.faults == (None, None)
+
+
+def test_two_sweeps_that_count_strikes_of_both_kinds_do_not_wait_for_each_other_for_ever(
+    edition: Edition, owner: User
+) -> None:
+    """Each kind of strike has one counter, and a sweep may count both kinds."""
+    for strike in lifecycle.Strike:
+        faults.note(faults.STRIKES, subject=strike.value.lower(), reason="", now=timezone.now())
+    for _ in range(4):
+        queue_rows.queued(edition, owner)
+    leases = [queue_rows.claim() for _ in range(4)]
+
+    def sweep(poison_first: bool, held: list[lifecycle.Lease]) -> None:
+        queue_rows.expire(held[0], overran=poison_first)
+        queue_rows.expire(held[1], overran=not poison_first)
+        queue_rows.release_expired()
+
+    with crowd_on_postgres():
+        outcome = meet(
+            partial(sweep, True, leases[:2]),
+            partial(sweep, False, leases[2:]),
+            at=lambda number, sql: sql.startswith('UPDATE "leaderboard_fault"'),
+        )
+    assert outcome == ((None, None), True, True)
+    assert [row.n_ever for row in Fault.objects.filter(kind=faults.STRIKES)] == [3, 3]
 
 
 def test_an_open_transaction_that_has_recorded_keeps_no_other_waiting(verbs: dict[str, Action]) -> None:
