@@ -11,6 +11,7 @@ import pytest
 import yaml
 from django.conf import settings
 
+from leaderboard.celery import app
 from leaderboard.errors import problem_codes
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -70,6 +71,49 @@ def test_units_start_programs_that_there_are_without_privileges(path: Path) -> N
     assert service["SupplementaryGroups"] == "tsttc-files"
     assert ("EnvironmentFile=/etc/tsttc-web.env" in path.read_text()) == (path.stem == "tsttc-web")
     assert (service["User"] == service["Group"] == "tsttc-web") == (path.stem == "tsttc-web")
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd is not installed")
+def test_systemd_understands_every_line_of_the_units(tmp_path: Path) -> None:
+    for path in (DEPLOY / "systemd").iterdir():
+        # Without what only a server has: the program, the project, the environment files.
+        text = re.sub(r"(?m)^(EnvironmentFile|WorkingDirectory)=.*\n", "", path.read_text())
+        text = re.sub(r"/opt/tsttc/bin/\w+", "/bin/true", text)
+        (tmp_path / path.name.replace("@.", "@x.")).write_text(text)
+        (tmp_path / path.name).write_text(text)
+    named = sorted(str(path) for path in tmp_path.iterdir() if "@." not in path.name)
+    assert len(named) == 5
+    command = ["systemd-analyze", "verify", "--man=no", "--recursive-errors=no"]
+    done = subprocess.run([*command, *named], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    # It does find what it does not know.
+    for unit_path in named[:2]:
+        Path(unit_path).write_text(f"[Unit]\nDescripton=x\n{Path(unit_path).read_text()}")
+    done = subprocess.run([*command, *named], capture_output=True, text=True, check=False)
+    assert done.stderr.count("Descripton") >= 2
+
+
+@pytest.mark.parametrize("name", ["tsttc-web", "tsttc-worker"])
+def test_processes_that_serve_come_back_and_have_time_to_end(name: str) -> None:
+    service = service_of(name)
+    assert service["Restart"] == "always"
+    grace_s = app.conf.worker_soft_shutdown_timeout
+    longest_s = {"tsttc-web": graceful_timeout_s(), "tsttc-worker": grace_s}[name]
+    assert int(service["TimeoutStopSec"]) > longest_s
+    assert "\nWantedBy=multi-user.target" in (DEPLOY / f"systemd/{name}.service").read_text()
+
+
+def service_of(name: str) -> configparser.SectionProxy:
+    unit = configparser.RawConfigParser(strict=False)
+    unit.optionxform = str  # type: ignore[assignment]  # systemd's own letters
+    unit.read(DEPLOY / f"systemd/{name}.service")
+    return unit["Service"]
+
+
+def graceful_timeout_s() -> int:
+    found = re.search(r"^graceful_timeout = (\d+)$", (DEPLOY / "gunicorn.conf.py").read_text(), re.MULTILINE)
+    assert found
+    return int(found[1])
 
 
 def test_a_backup_that_fails_sends_a_mail() -> None:

@@ -72,6 +72,46 @@ def test_every_service_is_without_privileges_and_has_limits(name: str) -> None:
         assert service["user"] not in {"root", "0"}
 
 
+def test_logs_of_a_container_have_the_size_that_the_documentation_says() -> None:
+    page = (REPOSITORY / "docs/operations.md").read_text()
+    for service in SERVICES.values():
+        options = service["logging"]["options"]
+        n_mb = int(options["max-size"].removesuffix("m")) * int(options["max-file"])
+        assert service["logging"]["driver"] == "json-file"
+        assert f"Docker keeps {n_mb} MB for each container" in page
+
+
+@pytest.mark.parametrize("name", sorted(SERVICES))
+def test_a_service_mounts_uses_and_awaits_what_compose_has(name: str) -> None:
+    service = SERVICES[name]
+    sources = [entry.split(":")[0] for entry in service.get("volumes", ())]
+    assert {each for each in sources if not each.startswith(".")} <= set(COMPOSE["volumes"])
+    # ./backup is made by hand, for the user of the containers.
+    files = [each for each in sources if each.startswith(".") and each != "./backup"]
+    assert [each for each in files if not (REPOSITORY / each).exists()] == []
+    assert set(service.get("depends_on", ())) <= set(SERVICES)
+    for other, how in service.get("depends_on", {}).items():
+        is_healthy = how["condition"] == "service_healthy"
+        assert not is_healthy or "healthcheck" in SERVICES[other], other
+
+
+def test_a_fault_that_needs_a_person_takes_no_container_down() -> None:
+    """`/healthy` is for alarms: a health check that asked it would restart a site whose backup is old."""
+    asked = [str(service["healthcheck"]["test"]) for service in SERVICES.values() if "healthcheck" in service]
+    script = (REPOSITORY / "deploy/healthcheck.py").read_text()
+    assert len(asked) >= 4
+    assert "/healthz" in script
+    assert [text for text in [*asked, script] if re.search(r"/healthy\b|/readyz", text)] == []
+
+
+def test_a_worker_has_memory_for_its_processes_and_their_readers() -> None:
+    limit = SERVICES["worker"]["mem_limit"]
+    command = " ".join(SERVICES["worker"]["command"])
+    n_processes = int(_DEFAULT.search(command.partition("--concurrency=")[2].partition(" ")[0])[1])  # type: ignore[index]
+    n_gb = int(_DEFAULT.search(limit)[1].removesuffix("g"))  # type: ignore[index]
+    assert n_gb * 2**30 >= n_processes * settings.CHILD_MEMORY_BYTES
+
+
 def test_networks_are_for_one_purpose_each_and_workers_have_no_way_out() -> None:
     networks = {name: set(service["networks"]) for name, service in SERVICES.items()}
     assert networks == {

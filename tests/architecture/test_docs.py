@@ -27,6 +27,18 @@ def test_every_link_of_a_document_leads_to_a_file_and_a_heading_in_it() -> None:
     assert broken == []
 
 
+def test_no_command_checks_out_a_release_that_a_copy_may_not_have() -> None:
+    """A newcomer runs it before the first release; the tag that a release makes is no such command."""
+    sources = (*REPOSITORY.glob("*.md"), *DOCS.glob("*.md"), *(REPOSITORY / "deploy").glob("*.*"))
+    named = [
+        f"{source.relative_to(REPOSITORY)}: {line.strip()}"
+        for source in sources
+        for line in source.read_text(encoding="utf-8").splitlines()
+        if re.search(r"(git (checkout|clone|switch)|--branch).*\bv\d", line)
+    ]
+    assert named == []
+
+
 def test_every_document_is_in_the_navigation_and_every_decision_in_its_list() -> None:
     listed = {entry.name for _, links in guides.navigation() for entry in links}
     decisions = (DOCS / "adr" / "README.md").read_text(encoding="utf-8")
