@@ -38,6 +38,7 @@ from leaderboard.moderation import takeovers
 from leaderboard.people import addresses, second_factor
 from leaderboard.quotas import mailboxes
 from leaderboard.web.account import identity
+from leaderboard.web.account.password_forms import VALIDATORS_HELP
 
 KNOWN_ADDRESS_S = 90 * 24 * 3600
 # What a request keeps of the addresses that the account had when it began.
@@ -226,6 +227,7 @@ class SignupForm(OwnersAddress, forms.SignupForm):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         confirmed = "We will send a code to it. " if settings.SENDS_MAIL else ""
+        self.fields["password1"].help_text = VALIDATORS_HELP
         self.fields["email"].help_text = f"{confirmed}Your team and the maintainers see it."
 
     def clean(self) -> dict[str, Any]:

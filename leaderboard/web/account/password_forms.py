@@ -1,6 +1,6 @@
 """Forms for a new password, with the API tokens of the account: they do not end with the old one."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from allauth.account import forms as allauth_forms
 from django import forms
@@ -16,12 +16,19 @@ else:
     _Form = object
 
 
+# What the validators of `settings.AUTH_PASSWORD_VALIDATORS` ask for.
+VALIDATORS_HELP: Final = (
+    "At least 8 characters. Not a common password, not only digits, and not similar to your name or email."
+)
+
+
 class _RevokesTokens(_Form):
     user: User
     is_ticked = False
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
+        self.fields["password1"].help_text = VALIDATORS_HELP
         rows = tokens.active(user=self.user, now=timezone.now()) if self.user else []
         if rows:
             self.fields["revoke_tokens"] = forms.BooleanField(

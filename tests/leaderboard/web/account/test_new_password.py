@@ -51,5 +51,14 @@ def test_after_a_reset_the_box_is_ticked(client: Client, owner: User, two_tokens
     assert n_working() == 0
 
 
+@pytest.mark.parametrize("address", ["/accounts/signup/", CHANGE])
+def test_a_form_for_a_new_password_says_once_what_it_must_be(signed_in: Client, address: str) -> None:
+    asker = Client() if address == "/accounts/signup/" else signed_in
+    form = pages.get(asker, address).one("main").one("form")
+    (advice,) = form.all("div", id="id_password1_helptext")
+    assert advice.text.startswith("At least 8 characters. Not a common password")
+    assert form.one("input", name="password1").attributes["aria-describedby"] == "id_password1_helptext"
+
+
 def test_who_has_no_tokens_is_not_asked(signed_in: Client) -> None:
     assert "revoke_tokens" not in signed_in.get(CHANGE).text
