@@ -7,8 +7,11 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
-from evaluator.predictions.values import WITHOUT_ESTIMATE
 from evaluator.problems import quoted
+
+WITHOUT_ESTIMATE: Final = (
+    "A sequence without an estimate needs a value, too: for example the median of the other values."
+)
 
 _NOTHING: Final = frozenset(
     [

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from evaluator.metrics.scale import Floats
 from evaluator.predictions.documents import Unit, kind_of
+from evaluator.predictions.slips import WITHOUT_ESTIMATE
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +35,6 @@ class Rule:
         return f"{sentence} {self.advice}".rstrip()
 
 
-WITHOUT_ESTIMATE: Final = (
-    "A sequence without an estimate needs a value, too: for example the median of the other values."
-)
 _RATIO: Final = "a scale ratio greater than 0"
 
 RULES: Final[dict[Unit, tuple[Rule, ...]]] = {

@@ -4,7 +4,7 @@ import json
 import math
 from typing import Any
 
-from evaluator.predictions.values import WITHOUT_ESTIMATE
+from evaluator.predictions.slips import WITHOUT_ESTIMATE
 from tests.evaluator.worlds import envelope, flat, make_truth
 
 MANIFEST = make_truth([4.0, -10.0, 1.0, 18.0]).manifest
