@@ -5,6 +5,7 @@ from datetime import datetime
 from typing import Any, cast
 from uuid import UUID
 
+from allauth.account.decorators import reauthentication_required
 from django import forms
 from django.contrib import messages
 from django.contrib.auth.views import redirect_to_login
@@ -101,6 +102,10 @@ def _done(request: HttpRequest, action: Callable[[], object], *, flash_message: 
     return redirect("team")
 
 
+# Whoever finds an open session must not give away the team, or the way to its methods, for good.
+_confirmed = reauthentication_required(_done)
+
+
 @own_form
 def team(request: HttpRequest) -> HttpResponse:
     """Show members and invitations; a posted name founds or renames the team."""
@@ -147,10 +152,12 @@ def leave(request: HttpRequest) -> HttpResponse:
     """Leave one's team; the last member of a team with methods has to confirm it."""
     _own_team(request)
     user = cast("User", request.user)
-    if _team_page(user, now=timezone.now())["would_be_lost"] and not request.POST.get("confirm"):
+    is_lost = _team_page(user, now=timezone.now())["would_be_lost"]
+    if is_lost and not request.POST.get("confirm"):
         sentence = "Confirm that the private methods become inaccessible; expected a tick."
         return _page(request, refusal=sentence, status=422)
-    return _done(request, lambda: teams.leave(user=user), flash_message="You left the team.")
+    done = _confirmed if is_lost else _done
+    return done(request, lambda: teams.leave(user=user), flash_message="You left the team.")
 
 
 @own_action
@@ -166,9 +173,14 @@ def remove(request: HttpRequest, handle: UUID) -> HttpResponse:
 @own_action
 def hand_over(request: HttpRequest, handle: UUID) -> HttpResponse:
     own, member = _member(request, handle)
-    return _done(
+    user = cast("User", request.user)
+    try:
+        teams.require_owner(own, user, doing="hands it over")
+    except Refused as refusal:
+        return _page(request, refusal=str(refusal), status=422)
+    return _confirmed(
         request,
-        lambda: teams.hand_over(team=own, to=member, actor=cast("User", request.user)),
+        lambda: teams.hand_over(team=own, to=member, actor=user),
         flash_message=f"{member.email} owns the team now.",
     )
 

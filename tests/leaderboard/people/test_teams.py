@@ -12,6 +12,7 @@ from leaderboard.methods import editing, visibility
 from leaderboard.models import AuditEvent, BoardVersion, Edition, Membership, Method, Team, User
 from leaderboard.people import invitations, teams
 from tests import builders, pages
+from tests.leaderboard.web.account.proving import confirm
 
 
 def owners(team: Team) -> list[User]:
@@ -230,6 +231,7 @@ def test_page_founds_renames_hands_over_removes_and_leaves(
     assert client.post("/team/leave/").status_code == 422
     assert client.post("/team/", {"name": "Barn Owls"}).status_code == 302
     assert client.post(f"/team/members/{stranger.membership.handle}/remove/").status_code == 404
+    confirm(client)
     assert client.post(f"/team/members/{teammate.membership.handle}/hand-over/").status_code == 302
     assert owners(team) == [teammate]
     assert client.post("/team/leave/").status_code == 302
@@ -245,6 +247,7 @@ def test_who_would_leave_methods_to_nobody_says_that_they_know(
     response = client.post("/team/leave/")
     assert response.status_code == 422
     assert "the private methods become inaccessible" in pages.page(response).one("main").text
+    confirm(client)
     assert client.post("/team/leave/", {"confirm": "on"}).status_code == 302
     assert teams.current_team_of(user=owner) is None
 

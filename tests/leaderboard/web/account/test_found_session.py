@@ -8,7 +8,9 @@ from django.core import mail
 from django.test import Client
 from pytest_django import Settings
 
-from leaderboard.models import ApiToken, User
+from leaderboard.models import ApiToken, Edition, Membership, User
+from leaderboard.people import teams
+from tests import builders
 from tests.leaderboard.web.account.proving import code_in, confirm, proving
 from tests.leaderboard.web.test_every_page import assert_sound
 
@@ -142,3 +144,28 @@ def test_the_password_opens_the_doors_for_some_minutes(owner: User, benchmark: N
     # Revoking a token takes nothing over.
     token = ApiToken.objects.get(user=owner)
     assert client.post("/tokens/revoke/", {"token": token.digest}).headers["Location"] == "/tokens/"
+
+
+# --- the team, which no undo link gives back ----------------------------------------------------------------
+
+
+def test_a_found_session_hands_no_team_over(owner: User, teammate: User, benchmark: None) -> None:
+    path = f"/team/members/{teammate.membership.handle}/hand-over/"
+    client = account(owner)
+    assert client.post(path, {"confirm": "on"}).headers["Location"].startswith(BY_PASSWORD)
+    assert Membership.objects.get(is_owner=True).user == owner
+    confirm(client)
+    assert client.post(path, {"confirm": "on"}).headers["Location"] == "/team/"
+    assert Membership.objects.get(is_owner=True).user == teammate
+    # Who may not anyway is told so, without a question.
+    assert client.post(path, {"confirm": "on"}).status_code == 422
+
+
+def test_a_found_session_leaves_no_methods_to_nobody(owner: User, edition: Edition) -> None:
+    builders.submit(owner, builders.predictions(edition))
+    client = account(owner)
+    assert client.post("/team/leave/", {"confirm": "on"}).headers["Location"].startswith(BY_PASSWORD)
+    assert teams.current_team_of(user=owner) is not None
+    confirm(client)
+    assert client.post("/team/leave/", {"confirm": "on"}).headers["Location"] == "/team/"
+    assert teams.current_team_of(user=owner) is None
