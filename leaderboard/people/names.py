@@ -1,5 +1,6 @@
 """Names that people choose: taken ones, and look-alikes (UTS 39)."""
 
+import re
 import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime, timedelta
@@ -29,19 +30,29 @@ _WITHOUT_INK = frozenset(
 _MAX_MARKS = 2
 # What stands around and between words beside punctuation; "<" and ">" look like brackets.
 _SEPARATORS = frozenset("<>~´¨")
+# Marks of a trade or a source, which NFKD would write as letters.
+_SIGNS = str.maketrans(dict.fromkeys("™℠", " "))
+# Lines that read as a dash; the sign of a long vowel is a letter after kana alone.
+_LINES = re.compile("[─━]|(?<![\u3041-\u30ff])ー")
+# What a final letter of Greek and a letter of German look like, which lists of twins name otherwise.
+_OTHER_LOOKS = str.maketrans({"ς": "s", "β": "ss"})
+# Letters that are read as digits between digits and separators.
+_LIKE_DIGITS = frozenset("oil|")
 
 
 def skeleton(name: str) -> str:
     """Return a key of at most `MAX_LOOK` characters, none of them a space; names with equal keys look alike.
 
-    Spaces and punctuation count between two digits alone, where any of them is a full stop.
+    Spaces and punctuation count between two digits alone, where any of them is a full stop. Badges, such as
+    a star or a tick, do not count.
 
     >>> skeleton("Foo  Lab") == skeleton("ｆｏｏ-lab") == skeleton("(Fоο Lаb)")
     True
     >>> skeleton("Foo 1.2") == skeleton("Foo 1-2"), skeleton("Foo 1.2") == skeleton("Foo 12")
     (True, False)
     """
-    folded = "".join(_folded(character) for character in unicodedata.normalize("NFKD", name)).casefold()
+    plain = unicodedata.normalize("NFKD", _LINES.sub("-", name).translate(_SIGNS)).translate(_OTHER_LOOKS)
+    folded = "".join(_folded(character) for character in plain).casefold()
     return _without_separators(folded).translate(_ONE_LOOK)[:MAX_LOOK]
 
 
@@ -50,13 +61,18 @@ def _without_separators(text: str) -> str:
     parts = spaced.split()
     kept = parts[:1]
     for before, part in pairwise(parts):
-        kept += [".", part] if before[-1].isdigit() and part[0].isdigit() else [part]
+        is_number = _ends_like_digit(before, before[-1]) and _ends_like_digit(part, part[0])
+        kept += [".", part] if is_number else [part]
     return "".join(kept)
+
+
+def _ends_like_digit(part: str, end: str) -> bool:
+    return end.isdigit() or all(each.isdigit() or each in _LIKE_DIGITS for each in part)
 
 
 def _separates(character: str) -> bool:
     category = unicodedata.category(character)
-    return character != "|" and (character in _SEPARATORS or category[0] in "PZ" or category == "Sk")
+    return character != "|" and (character in _SEPARATORS or category[0] in "PZ" or category in {"Sk", "So"})
 
 
 def clean_name(field: str, text: str) -> str:
@@ -136,9 +152,11 @@ def _folded(character: str) -> str:
         look = _prototypes().get(form, form)
         if look.isascii():
             return look
-    small_capital = unicodedata.name(character, "").partition("LATIN LETTER SMALL CAPITAL ")[2]
-    if len(small_capital) == 1:
-        return small_capital
+    # Small capitals, and letters in circles and squares.
+    for kind in ("LATIN LETTER SMALL CAPITAL ", "LATIN CAPITAL LETTER "):
+        letter = unicodedata.name(character, "").partition(kind)[2]
+        if len(letter) == 1:
+            return letter
     return _prototypes().get(character.casefold(), character.casefold())
 
 
