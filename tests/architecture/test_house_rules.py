@@ -4,6 +4,8 @@ import ast
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -55,6 +57,52 @@ def test_every_module_is_named_for_what_it_holds() -> None:
     # Tests start real services, and call them so.
     programs = python_files(*PROGRAMS, "benchmarks")
     assert [path for path in programs if names(path) & FORBIDDEN_NAMES] == []
+
+
+# --- modules do not import each other --------------------------------------------------------------------
+
+
+def statements_at_import(node: ast.AST) -> Iterator[ast.AST]:
+    """What runs when the module is imported: not functions, and not what only a type checker reads."""
+    for child in ast.iter_child_nodes(node):
+        is_for_types = isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"
+        if not is_for_types and not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            yield child
+            yield from statements_at_import(child)
+
+
+def imports_of(module: ast.Module, *, known: set[str]) -> set[str]:
+    names = set[str]()
+    for node in statements_at_import(module):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                inner = f"{node.module}.{alias.name}"
+                names.add(inner if inner in known else str(node.module))
+    return names & known
+
+
+def without_circle(modules: dict[str, ast.Module]) -> list[str]:
+    """The modules in an order of import. Raises `graphlib.CycleError`."""
+    graph = {name: imports_of(module, known=set(modules)) - {name} for name, module in modules.items()}
+    return list(TopologicalSorter(graph).static_order())
+
+
+def test_no_modules_import_each_other() -> None:
+    modules = {
+        ".".join(path.with_suffix("").parts).removesuffix(".__init__"): tree(path)
+        for path in python_files(*PROGRAMS, "benchmarks")
+    }
+    assert len(without_circle(modules)) == len(modules)
+
+
+def test_a_circle_of_imports_is_noticed() -> None:
+    one, two = ast.parse("from a.two import x"), ast.parse("import numpy\nfrom a import one")
+    with pytest.raises(CycleError):
+        without_circle({"a.one": one, "a.two": two})
+    late = ast.parse("def f():\n    from a.two import x")
+    assert without_circle({"a.one": late, "a.two": two}) == ["a.one", "a.two"]
 
 
 # --- only lifecycle.py writes a status -------------------------------------------------------------------
