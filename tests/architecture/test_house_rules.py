@@ -2,8 +2,6 @@
 
 import ast
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -134,28 +132,6 @@ def writes_a_status(call: ast.Call) -> bool:
         if keyword.arg == "defaults" and isinstance(keyword.value, ast.Dict):
             names |= {key.value for key in keyword.value.keys if isinstance(key, ast.Constant)}
     return name in writers and "status" in names
-
-
-def test_every_module_of_the_evaluator_can_be_the_first_that_is_imported() -> None:
-    # A program begins with any of them; two that import each other work in one order alone.
-    modules = [".".join(path.with_suffix("").parts) for path in python_files("evaluator")]
-    names = [name.removesuffix(".__init__") for name in modules if not name.endswith("__main__")]
-    assert len(names) > 50
-    subprocess.run([sys.executable, "-c", IMPORTS_EACH_FIRST, *names], cwd=REPOSITORY, check=True)
-
-
-IMPORTS_EACH_FIRST = """
-import importlib, sys
-for name in sys.argv[1:]:
-    for loaded in [each for each in sys.modules if each.partition(".")[0] == "evaluator"]:
-        del sys.modules[loaded]
-    try:
-        importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        # It needs a package of an extra.
-        if error.name.partition(".")[0] == "evaluator":
-            raise
-"""
 
 
 def test_only_lifecycle_writes_a_status() -> None:
