@@ -11,8 +11,9 @@ from evaluator.metrics.protocol import grouped_names, metric_of
 from evaluator.scoring.results import format_rounded
 from evaluator.tables import sentences
 from evaluator.tables.sentences import p_cell
-from evaluator.units import in_words
+from evaluator.units import RECORDING, in_words
 from leaderboard.boards.rows import Entry
+from leaderboard.models import Edition
 from leaderboard.statistics.comparisons import Compared, Pair
 from leaderboard.web.boards.score_columns import Group, score_groups, score_heading
 from leaderboard.web.charts import profile_chart, svg
@@ -35,16 +36,37 @@ def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, 
         {each.method: n_tried.get(each.method_id, 0) for each in compared.entries if each.method_id}
     )
     matrix = difference_matrix(compared)
+    pairs = [_pair_table(pair) for pair in compared.pairs]
     return {
         "compared": compared,
         "title": f"{_NUMBERS[len(names)].capitalize()} methods compared",
         "verdict": with_bold_names(verdict(compared), names),
         "matrix": matrix,
         "metric": metric_of(compared.entries[0].primary),
-        "pairs": list(map(_pair_table, compared.pairs)),
+        "description": "Differences of methods in each TTC range, and whether they are significant.",
+        "pairs": pairs,
+        "only_pair": pairs[0] if len(pairs) == 1 else None,
+        "how_tested": how_tested(compared.edition, is_hidden=compared.split.is_hidden),
         "profile": profile_chart.profile(compared.entries),
         "selection": with_bold_names(chosen, names),
     }
+
+
+def how_tested(edition: Edition, *, is_hidden: bool) -> str:
+    """Say what the test of a difference takes as independent, and what it can miss."""
+    noun = edition.unit_noun
+    alike = "sequences from one recording" if edition.unit == RECORDING else f"recordings from one {noun}"
+    told = [
+        f"A two-sided sign-flip test of whole {noun}s ({edition.units}), "
+        f"because {alike} resemble each other.",
+        "It gives the 95% CI and p, and can miss rare but severe failures.",
+    ]
+    if is_hidden:
+        told.append(
+            "The ground truth is hidden, so the ends of the intervals are rounded outwards: "
+            "0 may be an end although p is below 0.05."
+        )
+    return " ".join(told)
 
 
 def verdict(compared: Compared) -> str:

@@ -79,17 +79,18 @@ def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None
     names = board.rules.overall_names
     # A method's page asks for the choice of others beside it.
     chosen = [*request.GET.getlist("m"), *request.GET.getlist("with")]
+    rows = []
+    for i, entry in enumerate(entries):
+        is_chosen = str(entry.method_id) in chosen
+        if i < MAX_OFFERED or is_chosen:
+            values = [format_rounded(entry.scores[name], decimals=entry.decimals) for name in names]
+            rows.append((entry, values, is_chosen))
     return {
         "split": split,
         "board_split": split.pk,
-        "rows": [
-            (entry, [format_rounded(entry.scores[name], decimals=entry.decimals) for name in names])
-            for i, entry in enumerate(entries)
-            if i < MAX_OFFERED or str(entry.method_id) in chosen
-        ],
+        "rows": rows,
         "n_in_all": len(entries),
         "metrics": list(map(metric_of, names)),
-        "chosen": chosen,
         "max_methods": comparisons.MAX_METHODS,
         "refusal": refusal,
     }

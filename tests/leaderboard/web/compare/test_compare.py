@@ -130,8 +130,15 @@ def test_without_methods_it_offers_those_of_the_board(client: Client, entries: l
     assert offered == [str(entry.method_id) for entry in entries]
     # As many decimals as the edition publishes: the test split's have one.
     rows = [row.text for row in root.one("tbody").all("tr")]
-    assert all(re.search(r"Owls(\d+\.\d){2,}$", text.strip()) for text in rows), rows
+    assert all(re.search(r"Owls( \d+\.\d){2,}$", text.strip()) for text in rows), rows
     assert "No method has a score on Demo yet." in words(get(client, split="demo"))
+
+
+def test_choice_of_others_beside_a_method_has_it_ticked(client: Client, entries: list[Submission]) -> None:
+    beside = entries[-1].method_id
+    root = pages.page(client.get("/compare/", {"split": "test", "with": str(beside)}))
+    ticked = [box for box in root.all("input", type="checkbox") if "checked" in box.attributes]
+    assert [box.attributes["value"] for box in ticked] == [str(beside)]
 
 
 def test_too_few_recordings_are_named_and_no_p_is_shown(
