@@ -1,8 +1,12 @@
 """Following a submission: each answer says whether, and when, to ask again."""
 
-import pytest
+from datetime import timedelta
 
-from leaderboard.models import Edition, Submission, User
+import pytest
+from django.db.models.functions import Now
+
+from leaderboard.models import Edition, Evaluation, Status, Submission, User
+from leaderboard.submissions import progress
 from tests import builders
 from tests.leaderboard.api.test_submissions import client_of
 from tests.leaderboard.web.maintain import queue_rows
@@ -38,3 +42,17 @@ def test_an_answer_that_is_known_is_not_sent_again_and_says_when_to_come_back(
     builders.score_all()
     scored = client.get(address(waiting_one), headers=known)
     assert (scored.json()["state"], scored.headers.get("Retry-After")) == ("SCORED", None)
+
+
+@pytest.mark.parametrize("state", [Status.REJECTED, Status.CANCELLED, Status.SYSTEM_ERROR, Status.SCORED])
+def test_what_is_decided_asks_nobody_to_come_back_and_is_never_late(
+    waiting_one: Submission, owner: User, state: Status
+) -> None:
+    # Made by hand: a file that no run decides so, and long ago.
+    Evaluation.objects.update(status=state, finished_at=Now(), queued_at=Now() - timedelta(days=1))
+    answer = client_of(owner).get(address(waiting_one))
+    document = answer.json()
+    assert (document["state"], document["is_final"]) == (state, True)
+    assert "Retry-After" not in answer.headers
+    assert not progress.progress_of(waiting_one).is_late
+    assert progress.progress_of(waiting_one).n_ahead is None

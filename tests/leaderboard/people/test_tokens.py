@@ -271,3 +271,50 @@ def test_a_token_for_one_split_sends_with_the_details_that_stand_and_makes_new_m
     assert send(client, data, method="Bar", description="Another.")[0] == 201
     assert Method.objects.get(name="Bar").description == "Another."
     assert not AuditEvent.objects.filter(verb="edited").exists()
+
+
+# --- of two tokens ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("how", ["by its owner", "as leaked", "all of a person"])
+def test_revoking_one_token_leaves_those_of_others(
+    owner: User, stranger: User, maintainer: User, how: str
+) -> None:
+    first, second, others = builders.token(owner), builders.token(owner), builders.token(stranger)
+    now = timezone.now()
+    if how == "by its owner":
+        row = ApiToken.objects.filter(user=owner).earliest("created")
+        assert tokens.revoke(token=row, now=now, actor=owner)
+        assert not tokens.revoke(token=row, now=now, actor=owner)
+    elif how == "as leaked":
+        assert APIClient().post(REVOKE, {"token": first}, format="json").status_code == 200
+    else:
+        tokens.revoke_all(user=owner, reason="R", actor=maintainer, now=now)
+    statuses = [client_with(secret).get("/api/v1/account").status_code for secret in (first, second, others)]
+    assert statuses == [401, 401 if how == "all of a person" else 200, 200]
+
+
+@pytest.mark.parametrize("ended", ["expired", "revoked", "of another person"])
+def test_only_a_persons_own_working_tokens_count_towards_the_maximum(
+    owner: User, stranger: User, ended: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tokens, "MAX_ACTIVE", 2)
+    builders.token(owner)
+    builders.token(stranger if ended == "of another person" else owner)
+    rows = ApiToken.objects.filter(user=owner).order_by("created")
+    if ended == "expired":
+        rows.filter(pk=rows[0].pk).update(expiry=timezone.now() - timedelta(seconds=1))
+    elif ended == "revoked":
+        tokens.revoke(token=rows[0], now=timezone.now(), actor=owner)
+    builders.token(owner)
+    with pytest.raises(Refused, match="There are 2 tokens in use"):
+        builders.token(owner)
+
+
+def test_a_token_for_one_split_reads_the_quota_of_that_split_alone(edition: Edition, owner: User) -> None:
+    def splits_of(**options: Any) -> set[str]:
+        answer = client_with(builders.token(owner, **options)).get("/api/v1/quota")
+        return {row["split"] for row in answer.json()}
+
+    assert splits_of(split_name="val") == {"val"}
+    assert {"test", "val"} <= splits_of()

@@ -7,6 +7,7 @@ import pytest
 from django.db.models.functions import Now
 from pytest_django import Settings
 
+from leaderboard.db import clock
 from leaderboard.models import AuditEvent, Edition, Evaluation, Status, User
 from leaderboard.queue import lifecycle
 from leaderboard.queue.lifecycle import MAX_INFRASTRUCTURE_STRIKES, MAX_POISON_STRIKES, Lease, Strike
@@ -97,3 +98,16 @@ def test_a_sweep_that_comes_after_the_deadline_does_not_blame_the_file_for_a_dea
     )
     assert queue_rows.release_expired() == 1
     assert queue_rows.row(lease).n_poison_strikes == 0
+
+
+def test_first_retry_comes_within_the_backoff_and_no_later_one_after_more_than_a_minute(
+    edition: Edition, owner: User, settings: Settings
+) -> None:
+    settings.BACKOFF_S = 50.0
+    queue_rows.queued(edition, owner)
+    for longest_s in (50.0, 60.0, 60.0):
+        lease = queue_rows.claim()
+        assert queue_rows.give_back(lease) == Status.QUEUED
+        wait_s = (queue_rows.row(lease).due_at - clock.database_now()).total_seconds()
+        assert longest_s / 2 - 5 < wait_s <= longest_s
+        queue_rows.make_due()

@@ -265,3 +265,12 @@ def test_the_next_slot_opens_exactly_when_the_quota_says(
     assert weighed(quota.next_slot_at).is_open
     assert not weighed(quota.next_slot_at - timedelta(microseconds=1)).is_open
     assert quota.retry_after_s(now=now) == (quota.next_slot_at - now).total_seconds()
+
+
+def test_a_gap_longer_than_the_window_and_a_day_keeps_the_team_waiting(edition: Edition, owner: User) -> None:
+    limit(limit=5, window=DAY, min_gap=7 * DAY)
+    send(owner, other(edition, 1))
+    for later in (2 * DAY, 7 * DAY - timedelta(seconds=1)):
+        with pytest.raises(QuotaExceeded, match="at least 7 days apart"):
+            send(owner, other(edition, 2), at=NOW + later)
+    assert send(owner, other(edition, 2), at=NOW + 7 * DAY).is_new

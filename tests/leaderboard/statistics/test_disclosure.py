@@ -2,16 +2,31 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
+from uuid import UUID
 
 import numpy as np
 import pytest
 from django.db import transaction
 from django.test import Client
+from hypothesis import given
+from hypothesis import strategies as st
 
 from evaluator import SCORE_NAMES, Difference
 from leaderboard import board_versions
-from leaderboard.models import Comparison, Edition, Score, Split, Submission, User, Visibility
+from leaderboard.models import (
+    Comparison,
+    Edition,
+    Method,
+    Score,
+    Split,
+    Submission,
+    Team,
+    User,
+    Visibility,
+)
 from leaderboard.statistics import comparisons, disclosure
+from leaderboard.storage import hidden_marks
 from tests import builders
 from tests.leaderboard.statistics.test_comparisons import ask, known, set_visibility
 
@@ -273,3 +288,51 @@ def test_calling_a_hidden_split_open_in_the_database_tells_no_more_of_it(
         client.force_login(owner)
         assert client.get("/api/v1/compare", query).json()["pairs"][0]["withheld"] == pair.withheld
         assert pair.withheld in client.get("/compare/", query).text
+
+
+@pytest.mark.parametrize("is_marked", [True, False])
+@pytest.mark.parametrize(
+    ("teams", "visibilities", "is_published"),
+    [
+        ((1, 2), ("PUBLIC", "PUBLIC"), True),
+        ((1, 1), ("PUBLIC", "PUBLIC"), False),
+        ((1, 2), ("PUBLIC", "PRIVATE"), False),
+        ((1, 2), ("PRIVATE", "PUBLIC"), False),
+        ((1, 2), ("ANONYMOUS", "PUBLIC"), False),
+    ],
+)
+def test_a_mark_withholds_what_is_not_public_or_of_one_team_where_the_database_says_open(
+    edition: Edition,
+    is_marked: bool,
+    teams: tuple[int, int],
+    visibilities: tuple[str, str],
+    is_published: bool,
+) -> None:
+    edition.split.is_hidden = False
+    if not is_marked:
+        hidden_marks.path(edition.ground_truth_id).unlink(missing_ok=True)
+    assert hidden_marks.is_marked(edition.ground_truth_id) is is_marked
+    first, second = (
+        Submission(method=Method(team=Team(pk=UUID(int=team)), visibility=visibility))
+        for team, visibility in zip(teams, visibilities, strict=True)
+    )
+    why = disclosure.why_withheld_by_mark(first, second, edition=edition)
+    assert (why == "") is (is_published or not is_marked)
+
+
+@given(
+    st.floats(-50, 50),
+    st.floats(0, 9),
+    st.floats(0, 9),
+    st.sampled_from([0.1, 0.5, 1.0]),
+    st.sampled_from([1, 2]),
+)
+def test_the_published_interval_of_a_hidden_difference_holds_both_differences(
+    middle: float, below: float, above: float, least_step: float, decimals: int
+) -> None:
+    # The shown difference is that of two rounded values, and may lie outside of the computed interval.
+    exact = Difference(middle, middle - below, middle + above, 0.01)
+    for shown in (round(middle, decimals), round(middle + 0.1, decimals), round(middle - 0.1, decimals)):
+        public = published(exact, replace(exact, difference=shown), least_step=least_step)
+        assert public.low <= min(shown, exact.low) + 1e-9
+        assert max(shown, exact.high) - 1e-9 <= public.high
