@@ -52,7 +52,8 @@ def test_a_withdrawn_row_has_neither_value_nor_interval_and_the_other_has_both(
     assert (set(gone.scores.values()), gone.intervals, gone.rank) == ({None}, {}, None)
     assert stays.intervals.keys() == stays.scores.keys() == gone.scores.keys()
     assert (gone.withdrawn_at, stays.withdrawn_at) == (NOON, None)
-    by_id = {row["id"]: row for row in client.get("/api/v1/splits/test/board?intervals=yes").json()["entries"]}
+    document = client.get("/api/v1/splits/test/board?intervals=yes").json()
+    by_id = {row["id"]: row for row in document["entries"]}
     assert set(by_id[str(methods[0].pk)]["intervals"].values()) <= {None}
     assert by_id[str(methods[1].pk)]["intervals"]["mid"]["low"] is not None
 

@@ -1,16 +1,19 @@
 """A worker's run over real files: parsed in the limited child, scored or rejected, nothing else touched."""
 
+import itertools
 import json
 import random
+import time
 
 import pytest
 from django.utils import timezone
+from pytest_django import Settings
 
 from evaluator import evaluate, read_predictions, rounded
 from leaderboard.editions import ground_truth
-from leaderboard.models import Edition, Evaluation, Score, Status, User
+from leaderboard.models import Edition, Evaluation, Score, Status, Submission, User
 from leaderboard.queue import worker
-from leaderboard.storage import truth_values
+from leaderboard.storage import files, truth_values
 from leaderboard.submissions.progress import progress_of
 from tests import builders
 
@@ -69,3 +72,33 @@ def test_faulty_file_is_rejected_and_the_next_good_one_scored(
     assert [problem["code"] for problem in rejected.problems] == [code]
     assert progress_of(good).state == Status.SCORED
     assert Evaluation.objects.get(submission=bad).attempt == 1
+
+
+class Clock:
+    """A clock that goes on by so much whenever somebody looks at it."""
+
+    sleep = staticmethod(time.sleep)
+
+    def __init__(self, *, step_s: float) -> None:
+        self._seconds = itertools.count(0.0, step_s)
+
+    def monotonic(self) -> float:
+        return next(self._seconds)
+
+
+@pytest.mark.parametrize(("step_s", "n_read"), [(0.001, 4), (1_000.0, 1)])
+def test_a_batch_that_takes_longer_than_half_its_lease_is_handed_back_without_a_strike(
+    second: Edition, settings: Settings, monkeypatch: pytest.MonkeyPatch, step_s: float, n_read: int
+) -> None:
+    # Without kept values, each file of the batch is read again, alone.
+    for sent in Submission.objects.all():
+        files.store().delete(files.aligned_name(manifest_digest=sent.manifest_digest, digest=sent.digest))
+    monkeypatch.setattr(worker, "time", Clock(step_s=step_s))
+    settings.LEASE_S, settings.WALL_S = 60.0, 100_000.0
+    assert worker.run_next(rng=random.Random(0))
+    rows = Evaluation.objects.filter(edition=second)
+    assert sorted(row.status for row in rows) == ["QUEUED"] * (4 - n_read) + ["SCORED"] * n_read
+    assert {(row.n_poison_strikes, row.n_infrastructure_strikes) for row in rows} == {(0, 0)}
+    monkeypatch.undo()
+    builders.score_all()
+    assert {row.status for row in rows.all()} == {Status.SCORED}

@@ -89,3 +89,23 @@ def test_file_over_the_limit_is_refused_with_both_sizes(edition: Edition, owner:
 def test_file_name_is_shown_never_used(edition: Edition, owner: User) -> None:
     submission = builders.submit(owner, builders.predictions(edition), filename="..\\..\\etc/pass\x00wd")
     assert submission.filename == "passwd"
+
+
+def test_a_latency_without_hardware_is_refused_for_a_new_method_and_a_known_one(
+    edition: Edition, owner: User
+) -> None:
+    def send(factor: float, **details: str) -> None:
+        builders.send(owner, builders.predictions(edition, factor=factor), **details)
+
+    with pytest.raises(Refused, match="what the latency was measured on"):
+        send(1.1, latency_ms="3.5")
+    assert not Method.objects.exists()
+    assert not Submission.objects.exists()
+    send(1.1)
+    with pytest.raises(Refused, match="what the latency was measured on"):
+        send(1.2, latency_ms="3.5")
+    send(1.2, latency_ms="3.5", hardware="one GPU")
+    # What is known of the hardware holds for another latency.
+    send(1.3, latency_ms="4.5")
+    method = Method.objects.get()
+    assert (method.latency_ms, method.hardware) == (4.5, "one GPU")
