@@ -118,6 +118,11 @@ class Benchmark(_Table, frozen=True):
     splits: tuple[FirstSplit, ...] = ()
 
     @property
+    def description(self) -> str:
+        """Return what search engines show of a page that has no description of its own."""
+        return f"{self.site_name}: {self.dataset.description}"
+
+    @property
     def summary(self) -> str:
         """Return the task, and what the site shows of it."""
         return f"{self.task} Ranked results with confidence intervals."
