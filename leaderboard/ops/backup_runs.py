@@ -48,9 +48,14 @@ def last_good(*, using: str = "default") -> BackupRun | None:
 
 
 def failed_since_good(*, now: datetime, using: str = "default") -> QuerySet[BackupRun]:
-    """Return the backups since the last good one that ended badly, or never ended; the latest first."""
+    """Return the backups since the last good one that ended badly, or never ended; the latest first.
+
+    One that ended before the good one did is of no interest, such as a second one that was refused meanwhile.
+    """
     good = last_good(using=using)
     since = Q(started_at__gt=good.started_at) if good else Q()
+    if good:
+        since &= Q(finished_at=None) | Q(finished_at__gt=good.finished_at)
     is_over = ~Q(finished_at=None) | Q(started_at__lt=now - LONGEST)
     return BackupRun.objects.using(using).filter(since, is_over, is_ok=False).order_by("-started_at")
 

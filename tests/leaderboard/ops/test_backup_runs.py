@@ -53,3 +53,14 @@ def test_the_last_good_backup_is_remembered_however_old_it_is():
 
     assert backup_runs.last_good() == good
     assert not BackupRun.objects.filter(pk=bad.pk).exists()
+
+
+def test_a_backup_that_was_refused_during_a_good_one_is_of_no_interest():
+    now = timezone.now()
+    good, refused, later = (backup_runs.begin(now - hours * HOUR) for hours in (5, 4, 3))
+    backup_runs.finish(refused, now=now - 4 * HOUR, is_ok=False, fault="Another backup is being written")
+    backup_runs.finish(good, now=now - 2 * HOUR, is_ok=True, n_files=4)
+    assert not backup_runs.failed_since_good(now=now).exists()
+    # This one began during the good one as well, and ended badly after it.
+    backup_runs.finish(later, now=now - HOUR, is_ok=False, fault="the disk is full")
+    assert backup_runs.failed_since_good(now=now).get() == later
