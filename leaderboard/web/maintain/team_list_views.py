@@ -32,8 +32,14 @@ def team_list(request: HttpRequest) -> HttpResponse:
     page = Paginator(_teams(text), PER_PAGE).get_page(request.GET.get("page"))
     matches = Q(email__icontains=text) | Q(pk__in=takeovers.with_former_address(text))
     alone = User.objects.filter(matches, membership=None).order_by("email")
-    people = alone.exclude(email__endswith=f"@{forgetting.NOWHERE}")[:PER_PAGE]
-    context = {"form": form, "text": text, "page": page, "people": people}
+    people = alone.exclude(email__endswith=f"@{forgetting.NOWHERE}")
+    context = {
+        "form": form,
+        "text": text,
+        "page": page,
+        "people": people[:PER_PAGE],
+        "n_more_people": max(0, people.count() - PER_PAGE),
+    }
     if not text and page.number == 1:
         context["domains"] = mailboxes.busiest_domains(now=timezone.now())
         context["window"] = span(mailboxes.longest_window())

@@ -137,6 +137,14 @@ def test_a_maintainer_is_offered_only_what_the_rules_allow_on_the_own_account(
     assert all(word in other[1] for word in ("Close account", "Revoke tokens", "Forget person"))
 
 
+def test_more_people_without_a_team_than_a_page_shows_are_counted(keeper: Client, team: Team) -> None:
+    n_before = len(cells(get(keeper, TEAMS), "People without a team"))
+    User.objects.bulk_create(User(email=f"alone{number}@example.org") for number in range(52 - n_before))
+    assert len(cells(get(keeper, TEAMS), "People without a team")) == 50
+    assert "And 2 more: search for an address." in main_text(keeper, TEAMS)
+    assert "more: search" not in main_text(keeper, f"{TEAMS}?team=alone7@")
+
+
 def test_hub_leads_to_a_list_of_all_teams(keeper: Client, team: Team, stranger: User) -> None:
     other = teams.team_of(user=stranger)
     (tile,) = [li for li in get(keeper, "/maintain/").all("li") if li.text.startswith("Teams")]
