@@ -143,12 +143,15 @@ def _note_server(tried: list[tuple[Mail, Delivery]], *, now: datetime) -> None:
     """Say whether the mail server takes mails at all, by what came of a run; end what it refuses alone."""
     refused = _with(Outcome.REFUSED_PERHAPS_ALL, tried)
     broken = _with(Outcome.NO_CONNECTION, tried)
+    deferred = [
+        (mail, each) for mail, each in _with(Outcome.PUT_OFF, tried) if not blames_one_mail(each.reason)
+    ]
     if _with(Outcome.SENT, tried):
         faults.clear(faults.MAIL)
         for mail, delivery in refused:
             _end(mail, now=now, delivery=Delivery(Outcome.REFUSED, delivery.reason))
-    elif broken or (refused and len(_refused_recipients()) > 1):
-        _, last = (broken or refused)[-1]
+    elif broken or ((refused or deferred) and len(_recipients_of_a_fault()) > 1):
+        _, last = (broken or refused or deferred)[-1]
         # It names the recipient, whose mail may be sent later.
         reason = without_secrets(last.reason)
         if faults.note(faults.MAIL, reason=reason, now=now):
@@ -156,7 +159,7 @@ def _note_server(tried: list[tuple[Mail, Delivery]], *, now: datetime) -> None:
             log.warning("mail_server_takes_nothing", reason=reason)
 
 
-def _refused_recipients() -> set[str]:
+def _recipients_of_a_fault() -> set[str]:
     """Return who waits because of an answer that may concern every mail."""
     rows = put_off().values_list("recipient", "reason")
     return {recipient for recipient, reason in rows if not blames_one_mail(reason)}

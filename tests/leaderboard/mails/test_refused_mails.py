@@ -136,6 +136,28 @@ def test_a_refusal_of_every_mail_ends_none_and_is_shown_until_the_server_takes_o
     assert "takes none" not in client.get("/maintain/").text
 
 
+@pytest.mark.parametrize(
+    ("answer", "is_of_the_server"),
+    [
+        ("450 4.7.1 Client host rejected: cannot find your hostname", True),
+        ("451 4.3.5 Server configuration error", True),
+        ("451 Try again later", True),
+        ("452 4.2.2 Mailbox full", False),
+        ("450 4.1.1 Mailbox unavailable", False),
+    ],
+)
+def test_a_server_that_puts_two_mails_off_for_a_reason_of_its_own_is_named(
+    server: smtp_server.Server, settings: Settings, answer: str, is_of_the_server: bool
+) -> None:
+    settings.SENDS_MAIL = True
+    queue("first@example.org", "second@example.org")
+    server.recipient_answer = answer
+    for tries in range(4):
+        outbox.work_off(now=NOW + tries * 20 * MINUTE)
+    assert outbox.waiting() == 2
+    assert health.mails_wait(now=NOW + 70 * MINUTE) is is_of_the_server
+
+
 def test_a_refusal_that_may_be_of_all_ends_two_mails_once_another_is_taken(
     server: smtp_server.Server,
 ) -> None:
