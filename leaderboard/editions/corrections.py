@@ -78,6 +78,7 @@ def open_edition(
         row = ground_truth.add(split_name=split_name, path=path, now=now, actor=actor)
     else:
         row = _imported(split, digest)
+        ground_truth.require_unmarked(split, row)
     unit = ground_truth.units_of(row).kind
     with transaction.atomic():
         split = Split.objects.select_for_update(no_key=True).get(pk=split.pk)

@@ -153,7 +153,17 @@ def require_openable(split: Split, truth: evaluator.GroundTruth) -> None:
         why = f"the split's ground truth {hidden.short_digest} was imported as hidden"
     else:
         return
-    raise Refused(
+    raise _would_give_away(split, why)
+
+
+def require_unmarked(split: Split, row: GroundTruth) -> None:
+    """Raise `Refused` if the split is open, and this ground truth of it was imported as hidden."""
+    if not split.is_hidden and hidden_marks.is_marked(row.digest):
+        raise _would_give_away(split, f"the ground truth {row.short_digest} was imported as hidden")
+
+
+def _would_give_away(split: Split, why: str) -> Refused:
+    return Refused(
         "edition-refused",
         f"The split {split.pk!r} is open, and {why}. An open split shows the errors of single sequences, "
         "which would give the hidden values away; expected a ground truth without sequences of a hidden "

@@ -22,7 +22,7 @@ from leaderboard.models import Edition, Evaluation, SentFile, Status
 from leaderboard.queue import lifecycle
 from leaderboard.queue.lifecycle import Lease, LostRace, RunResult, Strike
 from leaderboard.sandbox import child, file_values, former_keys
-from leaderboard.statistics import recording_sums
+from leaderboard.statistics import disclosure, recording_sums
 from leaderboard.storage import truth_values
 
 log = structlog.get_logger(__name__)
@@ -97,7 +97,9 @@ def _release(waiting: deque[Lease]) -> None:
 
 def _evaluations(leases: Sequence[Lease]) -> list[Evaluation]:
     ids = [lease.evaluation_id for lease in leases]
-    by_id = Evaluation.objects.select_related("submission", "edition__ground_truth").in_bulk(ids)
+    by_id = Evaluation.objects.select_related(
+        "submission", "edition__ground_truth", "edition__split"
+    ).in_bulk(ids)
     return [by_id[pk] for pk in ids]
 
 
@@ -131,7 +133,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
                 warnings = warned.get(lease.evaluation_id)
                 if warnings is None:
                     warnings = warnings_of(predictions)
-                outcomes.append((lease, scored(report, decimals=edition.decimals, warnings=warnings)))
+                outcomes.append((lease, scored(report, edition=edition, warnings=warnings)))
                 continue
         except (Rejected, *FAULTS_OF_THE_FILE) as fault:
             # Worded, or struck, when it is read again from the file, alone.
@@ -246,7 +248,7 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> RunRes
     except Rejected as rejected:
         return rejection(former_keys.explained(rejected, file=file, edition=edition, heartbeat=heartbeat))
     recording_sums.save(edition, file=file, bags=report.bags)
-    return scored(report, decimals=edition.decimals, warnings=warnings_of(predictions))
+    return scored(report, edition=edition, warnings=warnings_of(predictions))
 
 
 def _scorer(edition: Edition) -> Scorer:
@@ -262,16 +264,20 @@ def _in_words(fault: Exception) -> str:
     return str(fault) if isinstance(fault, ours) else f"{type(fault).__name__}: {fault}"
 
 
-def scored(report: Report, *, decimals: int, warnings: Sequence[FileWarning] = ()) -> RunResult:
+def scored(report: Report, *, edition: Edition, warnings: Sequence[FileWarning] = ()) -> RunResult:
     """Round a report as its edition publishes it: values, counts, and nothing finer.
 
-    `warnings` come from file and manifest alone: others would tell of hidden values.
+    `warnings` come from file and manifest alone: others would tell of hidden values. Of hidden values, no
+    metric is kept that would tell more of them, whatever the database says of split and protocol.
     """
+    is_hidden = disclosure.is_hidden(edition)
+    allowed = {metric.name for metric in disclosure.HIDDEN_METRICS}
     values = {}
     for ttc_range, scores in report.scores.items():
         for metric, value in scores.means.items():
-            shown = rounded(value, decimals=decimals)
-            if shown is not None:
+            shown = rounded(value, decimals=edition.decimals)
+            is_kept = not is_hidden or metric in allowed
+            if shown is not None and is_kept:
                 values[metric, ttc_range] = shown
     return RunResult(
         status=Status.SCORED,

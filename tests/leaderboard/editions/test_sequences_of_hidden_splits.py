@@ -12,7 +12,7 @@ from django.utils import timezone
 from evaluator import read_truth
 from leaderboard.editions import corrections, ground_truth, label_changes
 from leaderboard.errors.refusals import Refused
-from leaderboard.models import Analysis, Edition, GroundTruth, Split, User
+from leaderboard.models import Analysis, Edition, GroundTruth, Score, Split, User
 from leaderboard.statistics import analyses, disclosure
 from leaderboard.storage import files, hidden_marks, seeds, truth_values
 from tests import builders
@@ -133,6 +133,30 @@ def test_workers_follow_the_mark_of_shared_sequences_and_not_the_database(
     assert disclosure.is_hidden(edition)
     assert seeds.seed_of(edition) != edition.ground_truth_id
     assert analyses.for_submission(submission=sent, viewer=owner) is None
+
+
+def test_a_hidden_ground_truth_gets_no_finer_metric_on_a_split_that_the_database_calls_open(
+    hidden: Edition, owner: User
+) -> None:
+    sent = builders.submit(owner, builders.predictions(hidden))
+    builders.score_all()
+    split = Split.objects.get(pk="test")
+    Split.objects.filter(pk="test").update(is_hidden=False)
+    with pytest.raises(Refused, match="was imported as hidden"):
+        corrections.open_edition(
+            split_name="test", digest=hidden.ground_truth_id, protocol="tsttc-2", now=NOW(), actor=None
+        )
+    # A row that somebody has written into the database, past every check.
+    split.refresh_from_db()
+    forged = ground_truth.new_edition(
+        split=split, row=hidden.ground_truth, protocol="tsttc-2", now=NOW(), actor=None
+    )
+    ground_truth.queue_missing(forged)
+    again = builders.submit(owner, builders.predictions(hidden, factor=1.3))
+    builders.score_all()
+    rows = Score.objects.filter(evaluation__edition=forged)
+    assert {row.evaluation.submission for row in rows} == {sent, again}
+    assert set(rows.values_list("metric", flat=True)) == {"mid", "rte"}
 
 
 def test_an_open_split_whose_ground_truth_was_hidden_takes_no_other_one(
