@@ -50,6 +50,9 @@ def render_board(
     table = tables.board_table(shown, query=query, now=now)
     is_filtered = query.filters.is_set
     ladder = rank_ladder(shown.unfiltered, primary=shown.rules.score_names[0])
+    profile = None
+    if not shown.at and not chart_views.has_progress(shown):
+        profile = chart_views.profile(shown, n_metrics=1 if ladder and not ladder.is_certain else 2)
     ladder_note = ""
     if ladder:
         ladder_note = ladder.note(by=primary if table.is_ranked_by_another else "", is_filtered=is_filtered)
@@ -75,10 +78,8 @@ def render_board(
         "open_splits": []
         if shown.is_open or shown.at
         else _listed([each for each in splits_of(request) if admissions.is_open(each, now=now)]),
-        "profile": None
-        if shown.at or chart_views.has_progress(shown)
-        else chart_views.profile(shown, n_metrics=1 if ladder and not ladder.is_certain else 2),
-        "n_profiles": chart_views.n_profiles(shown),
+        "profile": profile,
+        "profile_note": chart_views.profile_note(shown, profile) if profile else "",
         "progress_note": _progress_note(shown, is_filtered=is_filtered),
         "progress_label": f"{primary} of each method by date, with the lowest {primary} so far.",
         "n_withdrawn": sum(entry.withdrawn_at is not None for entry in shown.unfiltered),

@@ -50,6 +50,19 @@ class Chart:
     note: str = ""  # in a sentence, what it leaves out
 
     @property
+    def headings(self) -> list[tuple[str, str]]:
+        """Return the columns, each with its class."""
+        return [(text, "number" if i in self.numbers else "") for i, text in enumerate(self.columns)]
+
+    @property
+    def table_rows(self) -> list[list[tuple[str, str]]]:
+        """Return the rows, each text with the class of its cell."""
+        css = ["number" if i in self.numbers else "" for i in range(len(self.columns))]
+        if css and not css[0]:
+            css[0] = "first"
+        return [list(zip(row, css, strict=True)) for row in self.rows]
+
+    @property
     def n_panels(self) -> int:
         return len(self.options["baseOption"]["yAxis"])
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from datetime import datetime
 
+from django.conf import settings
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import render
 from django.utils import timezone
@@ -38,23 +39,37 @@ def charts(request: HttpRequest, split: str) -> HttpResponse:
 
 def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpResponse:
     n_waiting = sum(pair.differences is None for pair in pairs)
+    drawn_progress = progress(board, now=timezone.now())
+    resolution = _resolution(board, pairs)
+    drawn_profile = profile(board)
+    n_first = comparisons.N_FIRST if len(pairs) == math.comb(comparisons.N_FIRST, 2) else 0
     context = {
         "board": board,
-        "progress": progress(board, now=timezone.now()),
+        "description": f"The {board.split.title} split of {settings.BENCHMARK.name} in charts: "
+        "progress over time, accuracy against latency, errors by TTC range.",
+        "progress": drawn_progress,
         "latency": board_charts.latency(_public(board), metric=board.rules.primary),
-        "profile": profile(board),
-        "n_profiles": n_profiles(board),
+        # It has a line of its own where it would stand beside nothing.
+        "is_latency_whole": bool(resolution) != bool(drawn_progress),
+        "profile": drawn_profile,
+        "profile_note": profile_note(board, drawn_profile),
         "range_leaders": range_leaders(board),
         "significance": significance_chart.significance(pairs, split=board.split.pk),
         "n_pairs": len(pairs),
         "n_waiting": n_waiting,
         # A map of empty cells says less than a sentence.
         "is_early": 2 * n_waiting > len(pairs),
-        "n_first": comparisons.N_FIRST if len(pairs) == math.comb(comparisons.N_FIRST, 2) else 0,
-        "resolution": _resolution(board, pairs),
+        "cell_words": _cell_words(board.rules.primary.symbol, n_first=n_first),
+        "resolution": resolution,
         "alike": significance_chart.alike_words(pairs),
     }
     return render(request, "charts/charts.html", context)
+
+
+def _cell_words(symbol: str, *, n_first: int) -> str:
+    """Say what a cell of the map of pairs is; `n_first` is 0 where it has all submissions."""
+    shown = f", for the first {n_first} submissions" if n_first else ""
+    return f"Each cell: {symbol} of the row minus {symbol} of the column{shown}. Negative: the row is better."
 
 
 def _resolution(board: Board, pairs: Sequence[Pair]) -> list[tuple[str, list[str]]]:
@@ -92,9 +107,14 @@ def profile(board: Board, *, n_metrics: int | None = None) -> Chart:
     return profile_chart.profile(_public(board)[:N_PROFILES], n_metrics=n_metrics)
 
 
-def n_profiles(board: Board) -> int:
-    """Return how many rows the chart of errors draws of more; 0 if it draws them all."""
-    return N_PROFILES if len(_public(board)) > N_PROFILES else 0
+def profile_note(board: Board, drawn: Chart) -> str:
+    """Say which rows the chart of errors draws, and what it does not compare."""
+    methods = f"The first {N_PROFILES}" if len(_public(board)) > N_PROFILES else "All"
+    intervals = ", with 95% confidence intervals where available" if drawn.has_intervals else ""
+    note = f"{methods} methods on the board{intervals}."
+    if board.rules.primary.name == "mid":
+        note += " Do not compare MiD across ranges: at short TTC the image changes faster, so MiD is larger."
+    return note
 
 
 def _public(board: Board) -> list[Entry]:

@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
-from typing import Final
+from typing import Final, NamedTuple
 
 from django.conf import settings
 from django.http import Http404, HttpRequest, HttpResponse
@@ -32,6 +32,8 @@ from leaderboard.web.charts.chart_series import SERIES_INKS, SERIES_SYMBOLS, Loo
 
 _MIN_SETTINGS: Final = 3
 """Two settings are read faster in the table."""
+MAX_TOGETHER: Final = 24
+"""So many letters of a cell stay on one line."""
 _HOLLOW: Final = "Hollow: the paper’s default."
 _NEAR: Final = "Axes do not start at 0."
 """Of straight axes: a logarithmic one has no 0."""
@@ -161,6 +163,47 @@ def _with_best(shown: PrintedTable) -> list[tuple[PrintedRow, frozenset[int]]]:
     ]
 
 
+class PaperCell(NamedTuple):
+    """A text of a table with its heading; `is_default` marks the setting that the paper chose."""
+
+    heading: str
+    text: str
+    css: str
+    is_best: bool
+    is_default: bool
+
+    @property
+    def is_long(self) -> bool:
+        return len(self.text) > MAX_TOGETHER
+
+
+def _row_groups(shown: PrintedTable) -> list[list[tuple[bool, list[PaperCell]]]]:
+    """Return the rows, each with whether it is the default, those of one split together."""
+    groups: dict[str, list[tuple[bool, list[PaperCell]]]] = {}
+    for row, best in _with_best(shown):
+        cells = [
+            PaperCell(
+                heading=heading,
+                text=text,
+                css=_css_of(shown, i) or ("wraps" if len(text) > MAX_TOGETHER else ""),
+                is_best=i in best,
+                is_default=row.is_default and i == shown.n_names - 1,
+            )
+            for i, (heading, text) in enumerate(zip(shown.headings, row.cells, strict=True))
+        ]
+        split = row.cells[0] if shown.headings[0] == "Split" else ""
+        groups.setdefault(split, []).append((row.is_default, cells))
+    return list(groups.values())
+
+
+def _css_of(shown: PrintedTable, column: int) -> str:
+    return "number" if shown.table.is_result and column >= shown.n_names else ""
+
+
+def _about(shown: PrintedTable) -> str:
+    return " ".join(f"{part}." for part in (shown.section, shown.subject, shown.units) if part)
+
+
 @gzip_page
 @require_safe
 def published_page(request: HttpRequest) -> HttpResponse:
@@ -168,13 +211,16 @@ def published_page(request: HttpRequest) -> HttpResponse:
         raise Http404("This benchmark has no tables of a paper.")
     groups = _groups(published.printed_tables())
     context = {
+        "description": f"All tables of the {settings.BENCHMARK.name} paper as numbers: "
+        "main results, ablations, cameras and scripts, as CSV and LaTeX.",
         "tables": [
             {
                 "shown": each,
                 "chart": chart,
-                "rows": [
-                    (row, zip(each.headings, row.cells, strict=True), best) for row, best in _with_best(each)
-                ],
+                "about": _about(each),
+                "has_best": each.table.is_result and not each.table.parameter,
+                "headings": [(heading, _css_of(each, i)) for i, heading in enumerate(each.headings)],
+                "row_groups": _row_groups(each),
                 "notes": [note.partition(_WHY)[::2] for note in each.table.notes],
             }
             for each, chart in chain.from_iterable(groups.values())
