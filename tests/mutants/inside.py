@@ -1,5 +1,6 @@
 """What `python -m tests.mutants` does with the tests of a room, once pytest has collected them: a plugin."""
 
+import importlib
 import json
 import os
 import random
@@ -7,6 +8,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -26,6 +28,7 @@ def pytest_runtestloop(session: pytest.Session) -> bool:
     root = Path(options["root"])
     runs = Runs(session, root=root, jobs=options["jobs"])
     sources = sorted(path for name in options["sources"] for path in _python_files(root / name))
+    _import_all(sources, root)
     seen = _seen(runs, sources, Path(options["seen"]))
     _say(
         f"{len(seen.seconds)} of {len(session.items)} tests pass, after {time.monotonic() - started_s:.0f} s"
@@ -38,6 +41,14 @@ def pytest_runtestloop(session: pytest.Session) -> bool:
     _report(runs.try_out(chosen, seen, limit_s=options["seconds"]), options)
     _say(f"after {time.monotonic() - started_s:.0f} s")
     return True
+
+
+def _import_all(sources: list[Path], root: Path) -> None:
+    """What a test imports only while it runs has no function yet in which a fault could be planted."""
+    for path in sources:
+        names = path.relative_to(root).with_suffix("").parts
+        with suppress(ImportError):  # an extra that is not installed
+            importlib.import_module(".".join(name for name in names if name != "__init__"))
 
 
 def _seen(runs: Runs, sources: list[Path], kept: Path) -> Seen:
