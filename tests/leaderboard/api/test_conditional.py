@@ -82,3 +82,15 @@ def test_whatever_is_answered_has_a_tag_that_is_a_304_when_it_is_asked_with(
         head.getvalue()  # to its end, which closes what it would be sent from
         assert head["ETag"].startswith('"'), address
     assert n_answered >= n_least
+
+
+def test_what_is_known_varies_and_may_be_kept_as_the_whole_answer(shown: Submission, client: Client) -> None:
+    """Else a cache that several people share mixes what it says to people with and without a token."""
+    answers = {address: asked(client, address) for address in addresses(shown)}
+    tagged = {address: whole for address, whole in answers.items() if whole.has_header("ETag")}
+    assert len(tagged) > 10
+    for address, whole in tagged.items():
+        known = asked(client, address, known=whole.headers["ETag"])
+        assert known.status_code == 304, address
+        for name in ("ETag", "Vary", "Cache-Control"):
+            assert known.headers.get(name) == whole.headers.get(name), address

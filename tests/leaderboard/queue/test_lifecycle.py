@@ -226,3 +226,28 @@ def test_maintainer_retries_a_system_error_with_a_clean_slate(
     assert queue_rows.give_back(lease, Strike.POISON) == Status.QUEUED
     event = AuditEvent.objects.get(verb="retried")
     assert (event.actor, event.details) == (maintainer, {"reason": "the limit was too tight"})
+
+
+# --- limits, and two of a batch --------------------------------------------------------------------------
+
+
+def test_a_lease_ends_no_later_than_the_deadline(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    [lease] = lifecycle.claim(lease_s=WALL_S, wall_s=LEASE_S)
+    row = queue_rows.row(lease)
+    assert row.leased_until == row.deadline_at
+    assert row.deadline_at == row.started_at + timedelta(seconds=LEASE_S)
+
+
+def test_an_evaluation_of_a_batch_is_not_taken_for_another_one_that_is_decided(
+    edition: Edition, owner: User
+) -> None:
+    for _ in range(2):
+        queue_rows.queued(edition, owner, priority=Evaluation.PRIORITY_RESCORE)
+    first, second = lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, in_batches=True)
+    assert (first.token, first.attempt) == (second.token, second.attempt)
+    assert lifecycle.finalise(first, SCORED)
+    assert not lifecycle.finalise(first, SCORED)
+    lifecycle.cancel(submission=queue_rows.row(second).submission, actor=owner)
+    with pytest.raises(LostRace):
+        lifecycle.finalise(second, SCORED)

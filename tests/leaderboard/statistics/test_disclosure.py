@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from uuid import UUID
 
 import numpy as np
@@ -11,9 +12,11 @@ from django.db import transaction
 from django.test import Client
 from hypothesis import given
 from hypothesis import strategies as st
+from pytest_django import Settings
 
 from evaluator import SCORE_NAMES, Difference
 from leaderboard import board_versions
+from leaderboard.boards import listing
 from leaderboard.models import (
     Comparison,
     Edition,
@@ -25,9 +28,10 @@ from leaderboard.models import (
     User,
     Visibility,
 )
-from leaderboard.statistics import comparisons, disclosure
-from leaderboard.storage import hidden_marks
+from leaderboard.statistics import comparisons, disclosure, recording_sums
+from leaderboard.storage import hidden_marks, truth_values
 from tests import builders
+from tests.editions import ANYBODY
 from tests.leaderboard.statistics.test_comparisons import ask, known, set_visibility
 
 pytestmark = pytest.mark.slow
@@ -336,3 +340,30 @@ def test_the_published_interval_of_a_hidden_difference_holds_both_differences(
         public = published(exact, replace(exact, difference=shown), least_step=least_step)
         assert public.low <= min(shown, exact.low) + 1e-9
         assert max(shown, exact.high) - 1e-9 <= public.high
+
+
+def test_withheld_pairs_of_a_board_are_not_computed_for_the_database_either(
+    entries: list[Submission], edition: Edition, rival: Rival
+) -> None:
+    def noted() -> set[frozenset[str]]:
+        rows = Comparison.objects.values_list("first__submission", "second__submission")
+        return {frozenset(map(str, row)) for row in rows}
+
+    split = Split.objects.select_related("current_edition__ground_truth").get(pk="test")
+    comparisons.of_first(board=listing.board(split=split, viewer=ANYBODY))
+    assert noted() == set(), "all are of one team"
+    other = rival(1.07)
+    set_visibility(entries[0], Visibility.ANONYMOUS)
+    comparisons.of_first(board=listing.board(split=split, viewer=ANYBODY))
+    assert noted() == {frozenset([str(other.pk), str(sent.pk)]) for sent in entries[1:]}
+
+
+def test_sums_and_truth_are_for_the_owner_of_the_process_alone(
+    entries: list[Submission], edition: Edition, settings: Settings
+) -> None:
+    builders.infer_all()
+    sums = recording_sums.path(edition, file=entries[0].sent_file)
+    modes = [path.stat().st_mode & 0o777 for path in (sums, sums.parent, Path(settings.GROUND_TRUTH_DIR))]
+    assert modes == [0o600, 0o700, 0o700]
+    values = truth_values.values_path(edition.ground_truth_id)
+    assert values.stat().st_mode & 0o077 == 0

@@ -4,8 +4,9 @@ import random
 from datetime import UTC, datetime
 
 import pytest
+from django.utils import timezone
 
-from leaderboard.models import Edition, Evaluation, Status, User
+from leaderboard.models import Edition, Evaluation, Status, Submission, User
 from leaderboard.queue import lifecycle
 from leaderboard.queue.lifecycle import Strike
 from leaderboard.submissions.progress import Progress, progress_of
@@ -111,3 +112,19 @@ def test_cancelled_was_its_teams_wish(edition: Edition, owner: User) -> None:
     row = queue_rows.queued(edition, owner)
     lifecycle.cancel(submission=row.submission, actor=owner)
     assert progress(row).sentence == "The team cancelled the submission before it was scored."
+
+
+# --- of two editions -------------------------------------------------------------------------------------
+
+
+def test_a_file_keeps_its_result_in_the_last_published_edition_and_not_in_one_in_preparation(
+    entries: list[Submission], rescored: Edition
+) -> None:
+    rejected = Evaluation.objects.get(submission=entries[0], edition__number=1)
+    Evaluation.objects.filter(pk=rejected.pk).update(status=Status.REJECTED)
+    rejected.refresh_from_db()
+    assert rejected.kept_in is None
+    Edition.objects.filter(pk=rescored.pk).update(published_at=timezone.now())
+    rejected = Evaluation.objects.get(pk=rejected.pk)
+    assert rejected.kept_in == 2
+    assert Evaluation.objects.get(submission=entries[1], edition__number=1).kept_in is None

@@ -12,7 +12,8 @@ from django.utils import timezone
 from pytest_django import Settings
 
 from evaluator import receipts as form
-from leaderboard.models import Edition, Submission, User
+from leaderboard.errors.refusals import Refused
+from leaderboard.models import Edition, Evaluation, Submission, User
 from leaderboard.submissions import intake, receipts
 from tests import builders, pages
 from tests.editions import corrected, open_edition, publish
@@ -184,3 +185,16 @@ def test_malformed_key_is_reported_at_the_start(settings: Settings, key: str) ->
     assert "TSTTC_RECEIPT_KEY is malformed" in error.msg
     with pytest.raises(ImproperlyConfigured):
         receipts.private_key()
+
+
+def test_an_edition_in_preparation_has_no_receipt_even_if_it_alone_has_the_file(
+    entries: list[Submission], rescored: Edition
+) -> None:
+    with pytest.raises(Refused, match="no score in an edition 2"):
+        receipts.receipt(submission=entries[0], edition_number=2)
+    assert receipts.receipt(submission=entries[0]) == receipts.receipt(
+        submission=entries[0], edition_number=1
+    )
+    Evaluation.objects.exclude(edition=rescored).delete()
+    with pytest.raises(Refused, match="expected one that is scored"):
+        receipts.receipt(submission=Submission.objects.get(pk=entries[0].pk))
