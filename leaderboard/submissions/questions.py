@@ -11,10 +11,11 @@ from leaderboard.submissions import intake
 
 @dataclass(frozen=True)
 class Question:
-    """Sentences that make a question of a submission; `answer` confirms these alone, for this file."""
+    """Sentences that make a question of a submission; `answer` confirms these alone, for one file."""
 
     sentences: tuple[str, ...]
     answer: str
+    digest: str
 
 
 def question(request: intake.SubmissionRequest) -> Question | None:
@@ -28,7 +29,8 @@ def question(request: intake.SubmissionRequest) -> Question | None:
     if not sentences:
         return None
     about = [look.file.digest, look.split.pk, look.request.method_name, *sentences]
-    return Question(tuple(sentences), hashlib.sha256("\0".join(about).encode()).hexdigest()[:32])
+    answer = hashlib.sha256("\0".join(about).encode()).hexdigest()[:32]
+    return Question(tuple(sentences), answer, look.file.digest)
 
 
 def _warnings(look: intake.FirstLook) -> list[str]:

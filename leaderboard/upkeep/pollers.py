@@ -23,7 +23,7 @@ from leaderboard.people import addresses, sessions
 from leaderboard.queue import lifecycle, worker
 from leaderboard.quotas import mailboxes
 from leaderboard.statistics import analyses
-from leaderboard.storage import orphans, truth_values
+from leaderboard.storage import asked, orphans, truth_values
 from leaderboard.upkeep import backlog, store_check
 
 log = structlog.get_logger(__name__)
@@ -108,6 +108,7 @@ def clean(*, now: datetime) -> None:
             continue
         if is_removed:
             n_files, n_bytes = n_files + 1, n_bytes + orphan.size_bytes
+    asked.remove_old(now=now)
     # Half-written files of processes that were killed.
     for path in orphans.leftovers():
         path.unlink(missing_ok=True)

@@ -10,6 +10,7 @@ from uuid import UUID
 
 from django import forms
 from django.conf import settings
+from django.core.files.base import File
 from django.http import HttpRequest
 from django.utils import timezone
 
@@ -18,6 +19,7 @@ from leaderboard.methods import visibility
 from leaderboard.models import Method, Split, Submission, User
 from leaderboard.people import teams
 from leaderboard.quotas import admissions, usage
+from leaderboard.storage import asked
 from leaderboard.submissions import questions, search
 from leaderboard.submissions.intake import SubmissionRequest
 from leaderboard.submissions.questions import Question
@@ -73,6 +75,8 @@ class SubmissionForm(DetailsForm):
     )
 
     confirmed = forms.CharField(required=False, widget=forms.HiddenInput())
+    kept = forms.CharField(required=False, widget=forms.HiddenInput())
+    kept_name = forms.CharField(required=False, widget=forms.HiddenInput())
     note = forms.CharField(
         required=False,
         help_text="Optional. Only your team sees it.",
@@ -85,9 +89,15 @@ class SubmissionForm(DetailsForm):
             sent[0], sent[1], initial={"split": self._split_to_mark, "method": request.GET.get("method", "")}
         )
         self.question: Question | None = None
+        self.kept_digest = ""
+        # A script keeps the file itself, and asks for JSON.
+        self._has_script = "application/json" in request.headers.get("Accept", "")
+        self._kept: File[bytes] | None = None
         self._user = user
         self._preferred = request.GET.get("split", "")
         self.max_bytes = settings.MAX_PREDICTIONS_BYTES
+        if request.POST.get("kept") and "file" not in request.FILES:
+            self._take_kept(request.POST["kept"])
 
     # Read only where the form is drawn: a file that is accepted is answered without any of it.
     @cached_property
@@ -128,25 +138,55 @@ class SubmissionForm(DetailsForm):
         fields = (*self.described, *self.detailed)
         return not self.methods or any(field.value() or field.errors for field in fields)
 
+    def _take_kept(self, digest: str) -> None:
+        self._kept = asked.kept(user=self._user, digest=digest, now=timezone.now())
+        self.kept_digest = digest if self._kept is not None else ""
+        self.fields["file"].required = self._kept is None
+        self.fields["file"].error_messages["required"] = "The file is no longer kept; choose it again."
+
+    @property
+    def kept_name_shown(self) -> str:
+        """Return the name of the file that is kept, as it was sent."""
+        chosen = self.files.get("file")
+        return str(chosen.name if chosen else self.data.get("kept_name", ""))[:200]
+
     def asks(self, request: SubmissionRequest) -> bool:
         """Tell whether something is asked first that is not confirmed. Raises as `intake.submit`."""
-        asked = questions.question(request)
-        if asked is None or self.cleaned_data["confirmed"] == asked.answer:
+        question = questions.question(request)
+        if question is None or self.cleaned_data["confirmed"] == question.answer:
             return False
-        self.question = asked
+        self.question = question
+        if not self._has_script and request.upload is not None:
+            self._keep(request.upload, digest=question.digest)
         return True
+
+    def _keep(self, upload: "File[bytes]", *, digest: str) -> None:
+        if upload is self._kept or asked.keep(upload, user=self._user):
+            self.kept_digest = digest
+            self.fields["file"].required = False
+
+    def close(self) -> None:
+        """Close the file that was kept."""
+        if self._kept is not None:
+            self._kept.close()
+
+    def forget_kept(self) -> None:
+        """Remove the file that was kept: it is submitted."""
+        if self._kept is not None:
+            asked.forget(user=self._user)
 
     def submission_request(self, *, now: datetime) -> SubmissionRequest:
         """Make the request of the valid form."""
         fields = self.cleaned_data
+        upload = fields["file"] or self._kept
         return SubmissionRequest(
             user=self._user,
             split_name=fields["split"],
             method_name=fields["method"],
-            upload=fields["file"],
+            upload=upload,
             via=Submission.Via.WEB,
             now=now,
-            filename=fields["file"].name or "",
+            filename=self.kept_name_shown,
             details={field.name: fields[field.name] for field in (*self.described, *self.detailed)},
             note=fields["note"],
         )

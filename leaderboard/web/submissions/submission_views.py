@@ -1,5 +1,6 @@
 """Pages of submissions: form, list, one submission, analysis, receipt, withdrawal."""
 
+from contextlib import closing
 from typing import Any, cast
 from uuid import UUID
 
@@ -49,20 +50,27 @@ STOP_POLLING = 286
 @own_form
 def submit(request: HttpRequest) -> HttpResponse:
     user = cast("User", request.user)
-    form = SubmissionForm(user, request)
-    if request.method == "POST" and form.is_valid():
-        asked_for = form.submission_request(now=timezone.now())
-        try:
-            submitted = None if form.asks(asked_for) else intake.submit(asked_for)
-        except (intake.Refused, usage.QuotaExceeded) as refusal:
-            form.refuse(refusal)
-            submitted = None
+    with closing(SubmissionForm(user, request)) as form:
+        submitted = _submitted(form) if request.method == "POST" and form.is_valid() else None
         if submitted is not None:
             if not submitted.is_new:
                 messages.info(request, "You already submitted this file. Here is its result.")
             return _taken(request, submitted.submission)
-    is_sent = not form.errors and form.question is None
-    return render(request, "submissions/submit.html", {"form": form}, status=200 if is_sent else 422)
+        is_sent = not form.errors and form.question is None
+        return render(request, "submissions/submit.html", {"form": form}, status=200 if is_sent else 422)
+
+
+def _submitted(form: SubmissionForm) -> intake.Submitted | None:
+    """Submit the file of a valid form, unless something is asked first or it is refused."""
+    asked_for = form.submission_request(now=timezone.now())
+    try:
+        submitted = None if form.asks(asked_for) else intake.submit(asked_for)
+    except (intake.Refused, usage.QuotaExceeded) as refusal:
+        form.refuse(refusal)
+        return None
+    if submitted is not None:
+        form.forget_kept()
+    return submitted
 
 
 def _taken(request: HttpRequest, taken: Submission) -> HttpResponse:
