@@ -1,4 +1,7 @@
-"""Check the file store: write, read and remove a small file, and ask how much room is left."""
+"""Check the file store: write, read and remove a small file, and ask how much room is left.
+
+A directory that is not mounted can be written to as well, so the store must have a manifest of the site.
+"""
 
 import shutil
 from datetime import datetime
@@ -9,7 +12,7 @@ import structlog
 from django.core.files.base import ContentFile
 from django.core.files.storage import FileSystemStorage
 
-from leaderboard.models import SweepBeat
+from leaderboard.models import GroundTruth, SweepBeat
 from leaderboard.ops import faults
 from leaderboard.storage import files
 
@@ -18,6 +21,7 @@ log = structlog.get_logger(__name__)
 EVERY_S: Final = 60.0
 # Beside the prediction files, so that it needs the rights that they need; no digest has this name.
 PROBE: Final = "predictions/probe"
+MAX_MANIFESTS: Final = 5
 _CONTENT: Final = b"This file shows that the file store can be written to.\n"
 
 
@@ -38,6 +42,11 @@ def check(*, now: datetime) -> None:
 
 def _try() -> None:
     store = files.store()
+    digests = GroundTruth.objects.order_by("pk").values_list("manifest_digest", flat=True)[:MAX_MANIFESTS]
+    names = [files.manifest_name(digest) for digest in digests]
+    # One may be lost; not to have any is to be another store.
+    if names and not any(store.exists(name) for name in names):
+        raise OSError("the file store has no manifest of this site; is another directory or bucket mounted?")
     store.save(PROBE, ContentFile(_CONTENT))
     with files.open_named(PROBE) as kept:
         read = kept.read()
