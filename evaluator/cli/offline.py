@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -91,12 +91,20 @@ def check(
     good = "well-formed" if warnings else "good"
     n_predicted = counted(sequences.n_sequences, "sequence")
     click.echo(f"{name_of(predictions)} is {good}: {n_predicted}, each predicted once.")
+    if parsed.keys == "anno_id" and numbering is None:
+        click.echo(_ONLY_HERE)
     if n_infinite:
         click.echo(f"{counted(n_infinite, 'value')} infinite: no growth, or an overflow; scored as ±20 s.")
     if numbering is not None:
         click.echo(numbering_in_words(numbering))
     echo_warnings(warnings)
     click.get_current_context().exit(exit_code)
+
+
+_ONLY_HERE: Final = (
+    "Its keys are anno_ids, which other editions may give to other sequences. If it is from an earlier "
+    "edition, run: tsttc convert FILE --manifest OLD.csv"
+)
 
 
 def _sequences(manifest_path: Path | None, annotations: Path | None) -> tuple[Manifest, Numbering | None]:

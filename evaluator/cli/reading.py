@@ -22,13 +22,22 @@ TABLE: Final = click.Path(exists=True, path_type=Path)
 FOLDER: Final = click.Path(exists=True, file_okay=False, path_type=Path)
 
 
+OTHER_MANIFEST: Final = (
+    "If the file was made for another split or edition, check it with that manifest: tsttc manifest "
+    "--split SPLIT --edition N -o other.csv"
+)
+"""Offline, nobody can tell which one: the names of all splits and editions are on the leaderboard."""
+
+
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
     """Turn the library's rejection into a failure that names the file."""
     try:
         yield
     except Rejected as fault:
-        raise rejected(name_of(path), fault) from None
+        codes = {problem.code for problem in fault.problems}
+        has_other_keys = "unknown-keys" in codes and codes <= {"unknown-keys", "missing-keys"}
+        raise rejected(name_of(path), fault, hint=OTHER_MANIFEST if has_other_keys else "") from None
 
 
 def units_asked(truth: GroundTruth, unit: str | None) -> Units:

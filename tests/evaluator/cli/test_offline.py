@@ -214,3 +214,34 @@ def test_public_names_are_there_although_they_load_late() -> None:
     assert [name for name in evaluator.__all__ if getattr(evaluator, name, None) is None] == []
     with pytest.raises(AttributeError, match="no attribute 'absent'"):
         _ = evaluator.absent  # type: ignore[attr-defined]  # the point of the test
+
+
+@pytest.mark.parametrize("kind", ["natural keys", "anno_ids"])
+def test_keys_of_another_manifest_lead_to_that_manifest_and_other_faults_do_not(
+    tsttc: Tsttc, tmp_path: Path, kind: str
+) -> None:
+    truth = read_truth(TRUTH)
+    keys = truth.manifest.natural_keys if kind == "natural keys" else truth.manifest.anno_id_keys
+    values = dict(zip(keys, truth.ttc_s.tolist(), strict=True))
+    other, zero = tmp_path / "other.json", tmp_path / "zero.json"
+    other.write_text(json.dumps({f"9{key}": value for key, value in values.items()}))
+    zero.write_text(json.dumps(values | {keys[0]: 0}))
+    for arguments in (("check", "--manifest", MANIFEST), ("score", "--truth", TRUTH)):
+        for path, is_named in ((other, True), (zero, False)):
+            result = tsttc(arguments[0], path, *arguments[1:])
+            assert result.exit_code == 1
+            assert ("tsttc manifest --split SPLIT --edition N -o other.csv" in result.stderr) is is_named
+
+
+def test_a_good_file_with_anno_ids_is_told_that_they_count_in_one_edition(
+    tsttc: Tsttc, tmp_path: Path
+) -> None:
+    truth = read_truth(TRUTH)
+    for kind in ("anno_id", "natural_key"):
+        path = tmp_path / f"{kind}.json"
+        path.write_text(
+            json.dumps(dict(zip(truth.manifest.keys_of(kind), truth.ttc_s.tolist(), strict=True)))
+        )
+        result = tsttc("check", path, "--manifest", MANIFEST)
+        assert result.exit_code == 0
+        assert ("tsttc convert FILE --manifest OLD.csv" in result.stdout) is (kind == "anno_id")
