@@ -16,6 +16,8 @@ from leaderboard.models.audit import GENESIS, Unsealed
 log = structlog.get_logger(__name__)
 
 _CHUNK = 500
+# Each has a savepoint, of which PostgreSQL remembers 64 of a transaction without looking them up.
+_SEALED_AT_ONCE = 60
 # What stands in an event for a name that is in a table of its own.
 _TEXT = "text:"
 _IS_TEXT = re.compile(r"text:[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", re.ASCII)
@@ -114,7 +116,8 @@ def _seal_some(*, after: int | None) -> tuple[int, int] | None:
         if not SweepBeat.objects.select_for_update(skip_locked=True, no_key=True):
             return None
         waiting = AuditEvent.objects.filter(hash=None).order_by("pk")
-        events = list(waiting.filter(pk__gt=after)[:_CHUNK] if after is not None else waiting[:_CHUNK])
+        some = waiting if after is None else waiting.filter(pk__gt=after)
+        events = list(some[:_SEALED_AT_ONCE])
         number, tip = _end_of_chain()
         n_sealed = 0
         for event in events:
