@@ -319,7 +319,7 @@ def test_changes_name_rows_with_another_rank_or_value_then_those_gone_then_new_o
 def test_a_preview_counts_the_attempts_of_the_methods_own_team(
     edition: Edition, owner: User, stranger: User
 ) -> None:
-    board_rows.fill(edition, n=1, user=stranger, seed=4)
+    board_rows.fill(edition, n=12, user=stranger, seed=4)
     mine = builders.send(owner, builders.predictions(edition), method="Mine").submission.method
     shown = Method(team=mine.team, name="Shown", visibility="PUBLIC", shown_at=timezone.now())
     shown.save()
