@@ -28,7 +28,7 @@ _LEAST_REST: Final = 1e-5
 _LOG_2: Final = np.float32(math.log(2))
 _MAX_STEPS: Final = 40
 # So near the level is near enough: the tangent has its own r.
-_NEAR: Final = 0.9
+_NEAR: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,31 +51,63 @@ def tangents(each: Floats, squares: Floats, fourths: Floats, *, level: float, no
     offset = level - slope * t
     few = np.flatnonzero(3 * thirds * level**2 > _NEAR_NORMAL)
     if few.size:
-        shares = (np.sqrt(each[few]) / roots[few, None]).astype(np.float32)
-        slope[few], offset[few] = _of_few(shares, (_LEAST_REST + noise[few]).astype(np.float32), level)
+        shares = (each[few] * (1 / squares[few, None])).astype(np.float32)
+        np.sqrt(shares, out=shares)
+        rest = _LEAST_REST + noise[few]
+        # As if one unit had all of Σd⁴.
+        largest = np.minimum(np.sqrt(3 * thirds[few]), 1)
+        start = _start(largest, 1 - largest + rest, level)
+        slope[few], offset[few] = _of_few(
+            shares, rest.astype(np.float32), start.astype(np.float32), level
+        )
     return Tangents(slope / roots, offset)
 
 
-def _of_few(sizes: Weights, rest: Weights, level: float) -> tuple[Floats, Floats]:
+def _of_few(sizes: Weights, rest: Weights, half_squares: Weights, level: float) -> tuple[Floats, Floats]:
     # Solves s K'(s) − K(s) = level² / 2 by Newton's method for u = s² / 2, of which it is a concave function:
-    # the steps approach the solution from below.
+    # from the second step on the steps approach the solution from below. u is at least level² / 2.
     wanted = np.float32(level**2 / 2)
-    half_squares = np.full(len(sizes), wanted)
+    slope, offset = np.empty((2, len(sizes)))
+    left = np.arange(len(sizes))
+    totals = sizes.sum(axis=1)
     for _ in range(_MAX_STEPS):
         s = np.sqrt(2 * half_squares)
-        products = sizes * s[:, None]
-        shrunk = 1 + np.exp(-2 * products)
-        tanh = 2 / shrunk - 1
-        # log cosh x = x + log(1 + exp(−2x)) − log 2
-        log_cosh = (products + np.log(shrunk)).sum(axis=1) - sizes.shape[1] * _LOG_2
-        tau = np.einsum("ng,ng->n", sizes, tanh) + rest * s
+        # 1 + exp(−2x) of x = s d, of which tanh x = 2 / it − 1, and log cosh x = x + log it − log 2.
+        shrunk = sizes * (-2 * s)[:, None]
+        np.exp(shrunk, out=shrunk)
+        shrunk += 1
+        logs = np.log(shrunk).sum(axis=1)
+        np.reciprocal(shrunk, out=shrunk)
+        log_cosh = s * totals + logs - sizes.shape[1] * _LOG_2
+        tau = 2 * np.einsum("ng,ng->n", sizes, shrunk) - totals + rest * s
         reached = s * tau - log_cosh - rest * half_squares
-        is_far = reached < _NEAR * wanted
+        r = np.sqrt(2 * np.maximum(reached, np.finfo(np.float32).tiny))
+        slope[left] = s / r
+        offset[left] = r - tau * (s / r)
+        is_far = np.abs(reached - wanted) > _NEAR * wanted
         if not is_far.any():
             break
-        curvature = np.einsum("ng,ng->n", sizes**2, 1 - tanh**2) + rest
-        # A pair's steps do not depend on the others'.
-        half_squares = half_squares + np.where(is_far, (wanted - reached) / curvature, 0)
-    r = np.sqrt(2 * np.maximum(reached, np.finfo(np.float32).tiny))
-    slope = s / r
-    return slope.astype(np.float64), (r - tau * slope).astype(np.float64)
+        # Of those that are near, nothing more is computed: a pair's steps do not depend on the others'.
+        sizes, rest, totals, left, shrunk = (a[is_far] for a in (sizes, rest, totals, left, shrunk))
+        shrunk *= sizes
+        # 1 − tanh² = 4 y (1 − y) for y = 1 / (1 + exp(−2x))
+        curvature = 4 * (np.einsum("ng,ng->n", sizes, shrunk) - np.einsum("ng,ng->n", shrunk, shrunk)) + rest
+        steps = (wanted - reached[is_far]) / curvature
+        half_squares = np.maximum(half_squares[is_far] + steps, wanted)
+    return slope, offset
+
+
+def _start(largest: Floats, rest: Floats, level: float) -> Floats:
+    """Solve the same of one unit with the square `largest` and a normal sum with the variance `rest`, for u."""
+    wanted = level**2 / 2
+    half_squares = np.full(len(largest), wanted)
+    for _ in range(_MAX_STEPS):
+        x = np.sqrt(2 * half_squares * largest)
+        tanh = np.tanh(x)
+        reached = x * tanh - (np.logaddexp(x, -x) - math.log(2)) + rest * half_squares
+        is_far = reached < (1 - _NEAR) * wanted
+        if not is_far.any():
+            break
+        steps = (wanted - reached) / (largest * (1 - tanh**2) + rest)
+        half_squares = half_squares + np.where(is_far, steps, 0)
+    return half_squares

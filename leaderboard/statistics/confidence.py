@@ -51,7 +51,7 @@ MAX_UNREADABLE = 5
 # A worker that dies while it computes leaves the work to others after this time.
 CLAIM_S = 300.0
 # Raise it when ranges or intervals are computed in another way: workers then compute them again.
-_METHOD = 2
+_METHOD = 3
 # By the evaluation's id, of every column both ends, or None where there is no range.
 Ranges = dict[str, list[list[int] | None]]
 
