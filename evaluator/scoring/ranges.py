@@ -2,8 +2,9 @@
 
 A quoted row comes from a paper, without recordings: its printed 14.8 may be anything from 14.75 to 14.85. It
 takes part as an entry with the sum v n_g in recording g, v being the upper end when an entry is tested as
-worse and the lower end when tested as better, so a finding holds for every value in between. Two quoted rows
-are never compared.
+worse and the lower end when tested as better, so a finding holds for every value in between. It is a mean over
+recordings too: its own 95% interval is taken to be as wide as that of the entry, and a finding has to hold at
+the end of it as well. Two quoted rows are never compared.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ Indices = NDArray[np.intp]
 N_RANK_FLIPS: Final = 2_000
 """All pairs are compared at once, 19,900 of 200 entries; their critical value is read from so many draws."""
 
+# Of a 95% interval, in standard errors.
+_HALF_WIDTH: Final = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
 # Beside an entry's own sum of squares, what is below this is left of rounding: the pair is alike.
 _ALIKE: Final = 1e-12
 # The same of the difference in one recording: it is none.
@@ -120,11 +123,15 @@ def rank_ranges(
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """The rows of a column: entries, then both ends of quoted rows. `sums` are (n, G)."""
+    """The rows of a column: entries, then both ends of quoted rows. `sums` are (n, G).
+
+    `margins` are what half a 95% interval adds to the total of an entry, (n,).
+    """
 
     sums: Floats
     values: Floats
     kind: Integers
+    margins: Floats
 
     @cached_property
     def totals(self) -> Floats:
@@ -158,8 +165,9 @@ class _Pairs:
 
 
 def _rows(sums: Floats, values: Floats, quoted: Quoted | None, column: int) -> _Rows:
-    kinds = np.full(len(values), _ENTRY)
+    kinds, margins = np.full(len(values), _ENTRY), np.zeros(len(values))
     if quoted is not None:
+        margins = _margins(sums, quoted.counts[:, column])
         present = np.isfinite(quoted.values[:, column])
         half = quoted.half_widths[present, column]
         for kind in (_UPPER_END, _LOWER_END):
@@ -167,7 +175,14 @@ def _rows(sums: Floats, values: Floats, quoted: Quoted | None, column: int) -> _
             sums = np.concatenate([sums, ends[:, None] * quoted.counts[:, column]])
             values = np.concatenate([values, ends])
             kinds = np.concatenate([kinds, np.full(len(ends), kind)])
-    return _Rows(_exact(sums), values, kinds)
+    return _Rows(_exact(sums), values, kinds, margins)
+
+
+def _margins(sums: Floats, counts: Floats) -> Floats:
+    """Compute half the width of normal 95% intervals of entries, times the number of sequences."""
+    means = sums.sum(axis=1) / counts.sum()
+    residuals = sums - means[:, None] * counts
+    return np.asarray(_HALF_WIDTH * np.sqrt(np.einsum("ng,ng->n", residuals, residuals)))
 
 
 def _exact(sums: Floats) -> Floats:
@@ -253,6 +268,8 @@ def _measured(rows: _Rows, later: int, earlier: slice, level: float) -> _Pairs:
     totals = rows.totals[later] - rows.totals[earlier]
     # Of an entry and an end of a quoted row only one may be called worse; of two entries that with the
     # larger value, and of two that are published alike neither.
+    if rows.kind[later] != _ENTRY:
+        totals = np.copysign(np.maximum(np.abs(totals) - rows.margins[earlier], 0), totals)
     side = rows.kind[earlier] - rows.kind[later]
     order = np.sign(rows.values[later] - rows.values[earlier])
     totals[~((order * totals > 0) & ((side == 0) | (side == order)))] = 0.0

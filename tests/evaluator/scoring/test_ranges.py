@@ -43,13 +43,19 @@ def rarity_of(gaps: Floats, level: float) -> tuple[float, float]:
     return float(tangent.slope[0]), float(tangent.offset[0])
 
 
+def margin_of(sums: Floats, counts: Floats) -> float:
+    """Half a 95% interval of an entry's total, by its residuals."""
+    residuals = sums - sums.sum() / counts.sum() * counts
+    return float(1.959964 * np.sqrt((residuals**2).sum()))
+
+
 def ranges_of_a_loop(
     sums: Floats, counts: Floats, papers: Papers | None = None, *, n_steps: int = 100
 ) -> list[tuple[int, int, bool]]:
     """Step-down over all ordered pairs, one after the other, as the papers have it.
 
-    A quoted row counts with its lower end where it may be worse, with its upper end where it may be better;
-    two quoted rows are no pair.
+    A quoted row counts with its lower end where it may be worse, with its upper end where it may be better,
+    and with an interval as wide as that of the entry; two quoted rows are no pair.
     """
     values = np.round(sums.sum(axis=1) / counts.sum(axis=0), 2)[:, 0]
     names = [*range(len(sums)), *(f"paper {i}" for i in range(len(papers or [])))]
@@ -73,7 +79,10 @@ def ranges_of_a_loop(
         (value, own), (other_value, other) = end(worse, -1), end(better, 1)
         gaps = own - other
         slope, offset = rarity_of(gaps, level) if (gaps != 0).sum() >= 6 else (0.0, 0.0)
-        observed[worse, better] = slope * gaps.sum() + offset if value > other_value else 0.0
+        entries = [name for name in (worse, better) if isinstance(name, int)]
+        total = gaps.sum() - (margin_of(sums[entries[0]], counts) if len(entries) == 1 else 0)
+        is_worse = value > other_value and total > 0
+        observed[worse, better] = slope * total + offset if is_worse else 0.0
         draws[worse, better] = slope * (signs @ gaps) + offset
     family, rejected = set(observed), set()
     for _ in range(n_steps):
@@ -181,6 +190,18 @@ def test_a_quoted_row_is_above_or_below_only_with_its_whole_rounding_interval() 
     assert ranges_of(sums, counts, [(20.1, 0.05)]) == [(1, 2, True)]
     assert ranges_of(sums, counts, [(20.1, 0.005)]) == [(1, 1, True)]
     assert ranges_of(sums, counts, [(20.0, 0.5)]) == [(1, 2, True)]
+
+
+def test_a_quoted_row_decides_a_rank_only_beyond_an_interval_as_wide_as_the_entrys() -> None:
+    """Of two papers, both beyond what the entry alone would need, one is within the sum of both intervals."""
+    sums, counts = some_sums(27, n_entries=1)
+    mean, half = float(sums.sum() / counts.sum()), margin_of(sums[0], counts) / float(counts.sum())
+    for sign, ranks in ((1, (1, 2, True)), (-1, (2, 3, False))):
+        near, far = mean + sign * 1.8 * half, mean + sign * 3.5 * half
+        alone = (1, 1, True) if sign > 0 else (2, 2, False)
+        assert ranges_of(sums, counts, [(near, 0.0)]) == [(1, 2, True)]
+        assert ranges_of(sums, counts, [(far, 0.0)]) == [alone]
+        assert ranges_of(sums, counts, [(near, 0.0), (far, 0.0)]) == [ranks]
 
 
 def test_two_quoted_rows_count_as_two_and_are_never_compared() -> None:
