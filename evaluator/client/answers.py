@@ -86,12 +86,13 @@ class Account(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ConfidenceInterval(msgspec.Struct, frozen=True, kw_only=True):
-    """The 95% interval of a value and of its rank; None if unknown."""
+    """The 95% interval of a value and of its rank; None if unknown, and `reason` says why."""
 
     low: float | None = None
     high: float | None = None
     rank_low: int | None = None
     rank_high: int | None = None
+    reason: str = ""
 
 
 class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):

@@ -57,9 +57,7 @@ def tangents(each: Floats, squares: Floats, fourths: Floats, *, level: float, no
         # As if one unit had all of Σd⁴.
         largest = np.minimum(np.sqrt(3 * thirds[few]), 1)
         start = _start(largest, 1 - largest + rest, level)
-        slope[few], offset[few] = _of_few(
-            shares, rest.astype(np.float32), start.astype(np.float32), level
-        )
+        slope[few], offset[few] = _of_few(shares, rest.astype(np.float32), start.astype(np.float32), level)
     return Tangents(slope / roots, offset)
 
 
@@ -98,7 +96,7 @@ def _of_few(sizes: Weights, rest: Weights, half_squares: Weights, level: float) 
 
 
 def _start(largest: Floats, rest: Floats, level: float) -> Floats:
-    """Solve the same of one unit with the square `largest` and a normal sum with the variance `rest`, for u."""
+    """Solve the same for u, of one unit with the square `largest` and a normal sum of variance `rest`."""
     wanted = level**2 / 2
     half_squares = np.full(len(largest), wanted)
     for _ in range(_MAX_STEPS):

@@ -2,14 +2,13 @@
 
 A quoted row comes from a paper, without recordings: its printed 14.8 may be anything from 14.75 to 14.85. It
 takes part as an entry with the sum v n_g in recording g, v being the upper end when an entry is tested as
-worse and the lower end when tested as better, so a finding holds for every value in between. It is a mean over
-recordings too: its own 95% interval is taken to be as wide as that of the entry, and a finding has to hold at
-the end of it as well. Two quoted rows are never compared.
+worse and the lower end when tested as better, so a finding holds for every value in between. It is a mean
+over recordings too: its own 95% interval is taken to be as wide as that of the entry, and a finding has to
+hold at the end of it as well. Two quoted rows are never compared.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -51,8 +50,6 @@ _BLOCK: Final = 1 << 13
 # So many float32 stay in the processor's cache.
 _CELLS: Final = 1 << 16
 _DRAWS: Final = 250
-# Of the draws, so many with the largest statistics nearly always contain the largest 5% of fewer pairs.
-_N_HIGHEST: Final = 500
 
 _ENTRY: Final = 0
 # Of a quoted row's value: entries may be worse than its upper end, and better than its lower end.
@@ -194,52 +191,27 @@ def _exact(sums: Floats) -> Floats:
 
 def _significant(rows: _Rows, signs: Floats, between: Callable[[], None]) -> _Pairs:
     """Find the pairs that differ significantly, by step-down over all pairs."""
-    turned = (rows.sums @ signs).astype(np.float32)
-    pairs, highest = _all_pairs(rows, turned, between)
-    n_left, critical = len(pairs.statistic), _critical(highest, len(highest))
-    if critical >= pairs.statistic.max(initial=0):
-        return pairs.of(slice(n_left, None))
-    # Fewer pairs have a lower maximum, so draws with a low maximum of all pairs do not decide on the bound.
-    order = np.argsort(-highest, kind="stable")
-    turned, highest = turned[:, order], highest[order]
-    n_draws = _N_HIGHEST
-    up_to = _largest_up_to(turned[:, :n_draws], pairs, between)
-    while (n_now := int(np.searchsorted(pairs.statistic, critical, side="right"))) < n_left:
-        n_left = n_now
-        critical = _critical(_largest_of(turned[:, :n_draws], pairs, n_left, up_to), len(highest))
-        if n_draws < len(highest) and critical - _TIE < highest[n_draws]:
-            n_draws = len(highest)
-            up_to = _largest_up_to(turned, pairs, between)
-            critical = _critical(_largest_of(turned, pairs, n_left, up_to), n_draws)
-    return pairs.of(slice(n_left, None))
-
-
-def _all_pairs(rows: _Rows, turned: Weights, between: Callable[[], None]) -> tuple[_Pairs, Weights]:
-    """Measure all pairs, and find each draw's largest statistic of them and of their opposites.
-
-    The pairs are in the order of their statistics.
-    """
     n_entries = int(np.count_nonzero(rows.kind == _ENTRY))
     level, blocks = _level(n_entries, len(rows.kind) - n_entries), []
-    highest = np.zeros(turned.shape[1], dtype=np.float32)
     for later in range(len(rows.values)):
         if later % _ROWS == 0:
             between()
         for start in range(0, later + 1, _PAIRS):
             # Entries come first: two quoted rows are no pair.
             stop = min(start + _PAIRS, later, n_entries)
-            earlier = slice(start, max(start, stop))
-            pairs = _measured(rows, later, earlier, level)
-            blocks.append(pairs)
-            statistics = turned[later] - turned[earlier]
-            statistics *= np.where(pairs.worse == later, pairs.slope, -pairs.slope)[:, None]
-            if rows.kind[later] == _ENTRY:
-                np.abs(statistics, out=statistics)
-            statistics += pairs.offset[:, None]
-            np.maximum(highest, statistics.max(axis=0, initial=0), out=highest)
+            blocks.append(_measured(rows, later, slice(start, max(start, stop)), level))
     parts = (np.concatenate([getattr(each, name) for each in blocks]) for name in _Pairs.__slots__)
-    together = _Pairs(*parts)
-    return together.of(np.argsort(together.statistic, kind="stable")), highest
+    pairs = _Pairs(*parts)
+    pairs = pairs.of(np.argsort(pairs.statistic, kind="stable"))
+    turned = (rows.sums @ signs).astype(np.float32)
+    up_to = _largest_up_to(turned, pairs, between)
+    n_left, critical = len(pairs.statistic), _critical(up_to[-1])
+    while (n_now := int(np.searchsorted(pairs.statistic, critical, side="right"))) < n_left:
+        n_left = n_now
+        n_whole = n_left // _BLOCK
+        rest, _ = _largest(turned, pairs.of(slice(n_whole * _BLOCK, n_left)))
+        critical = _critical(np.maximum(up_to[n_whole], rest))
+    return pairs.of(slice(n_left, None))
 
 
 def _level(n_entries: int, n_ends: int) -> float:
@@ -307,13 +279,6 @@ def _largest_up_to(turned: Weights, pairs: _Pairs, between: Callable[[], None]) 
     return np.maximum(np.stack(rises), opposite)
 
 
-def _largest_of(turned: Weights, pairs: _Pairs, n: int, up_to: Weights) -> Weights:
-    """Find each draw's largest statistic of the first `n` pairs and of all opposites."""
-    n_whole = n // _BLOCK
-    rest, _ = _largest(turned, pairs.of(slice(n_whole * _BLOCK, n)))
-    return np.maximum(up_to[n_whole], rest)
-
-
 def _largest(turned: Weights, pairs: _Pairs) -> tuple[Weights, Weights]:
     """Find each draw's largest statistic of the pairs and of their two-sided opposites; both at least 0."""
     rise, fall = np.zeros((2, turned.shape[1]), dtype=np.float32)
@@ -334,8 +299,6 @@ def _largest(turned: Weights, pairs: _Pairs) -> tuple[Weights, Weights]:
     return rise, fall
 
 
-def _critical(largest: Weights, n_draws: int) -> np.float32:
-    """Return the 95% quantile of `n_draws` statistics, of which at least the largest 5% are given."""
-    n_above = n_draws - 1 - math.ceil(CONFIDENCE * (n_draws - 1))
+def _critical(largest: Weights) -> np.float32:
     # What is above by rounding alone is as large.
-    return np.float32(np.partition(largest, len(largest) - 1 - n_above)[len(largest) - 1 - n_above] + _TIE)
+    return np.float32(np.quantile(largest, CONFIDENCE, method="higher") + _TIE)

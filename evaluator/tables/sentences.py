@@ -201,17 +201,33 @@ def without_interval(
         if value is None:
             continue
         metric, ttc_range = metric_of(name), split_name(name)[1]
-        n_sequences, degrees = counts.get(ttc_range), n_effective.get(name, MIN_DEGREES)
-        if degrees < MIN_DEGREES:
-            reason = too_few_units(degrees, unit=unit)
-        elif value or not n_sequences:
-            reason = f"fewer than {MIN_DIFFERENT} {in_words(unit)} have an error"
-        elif metric == WARNING:
-            reason = _no_warning_error(n_sequences, decimals)
-        else:
-            reason = "no sequence has an error"
+        reason = why_no_interval(
+            name,
+            value,
+            n_sequences=counts.get(ttc_range),
+            decimals=decimals,
+            n_effective=n_effective.get(name, MIN_DEGREES),
+            unit=unit,
+        )
         labels.setdefault(reason, []).append(f"{metric.symbol} {ttc_range}")
     return [f"{', '.join(names)}: {reason}" for reason, names in labels.items()]
+
+
+def why_no_interval(
+    name: str, value: float, *, n_sequences: int | None, decimals: int, n_effective: float, unit: str
+) -> str:
+    """Say why this score has no interval, though others have.
+
+    >>> why_no_interval("mid_large", 0.1, n_sequences=12_270, decimals=2, n_effective=700.0, unit="day")
+    'fewer than 6 days have an error'
+    """
+    if n_effective < MIN_DEGREES:
+        return too_few_units(n_effective, unit=unit)
+    if value or not n_sequences:
+        return f"fewer than {MIN_DIFFERENT} {in_words(unit)} have an error"
+    if metric_of(name) == WARNING:
+        return _no_warning_error(n_sequences, decimals)
+    return "no sequence has an error"
 
 
 def _no_warning_error(n_sequences: int, decimals: int) -> str:

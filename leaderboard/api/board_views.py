@@ -52,7 +52,8 @@ def _board(
         filters=filters.parse(query.dict()),
     )
     has_intervals = tables.is_asked_for("intervals", query.get("intervals", ""))
-    return Response(BoardSerializer(board, context={"has_intervals": has_intervals}).data)
+    context = {"has_intervals": has_intervals, "explained_by": board.edition}
+    return Response(BoardSerializer(board, context=context).data)
 
 
 class BoardView(APIView):

@@ -27,6 +27,7 @@ from leaderboard.methods.details import Details
 from leaderboard.models import Split, Visibility
 from leaderboard.quotas import admissions
 from leaderboard.quotas.usage import Quota
+from leaderboard.statistics.missing_intervals import explained
 
 SPLIT: Final = "Name of the split."
 EDITION: Final = "Number of the edition."
@@ -279,11 +280,20 @@ class UncertaintySerializer(serializers.Serializer[ConfidenceInterval]):
     high = serializers.FloatField(
         allow_null=True, help_text="Upper end of the 95% confidence interval; null: as `low`."
     )
-    rank_low = serializers.IntegerField(allow_null=True, help_text="Best rank of the rank range.")
+    rank_low = serializers.IntegerField(
+        allow_null=True,
+        help_text="Best rank of the rank range; a quoted row counts as if it had an interval as wide as this "
+        "one.",
+    )
     rank_high = serializers.IntegerField(allow_null=True, help_text="Worst rank of the rank range.")
     is_with_best = serializers.BooleanField(
         allow_null=True,
         help_text="Whether it may be the best of the column at 95%: `rank_low` is 1, counting quoted rows.",
+    )
+    reason = serializers.CharField(
+        allow_blank=True,
+        help_text="Why there is no interval and will be none, as pages say it; empty where there is one, or "
+        "will be.",
     )
 
 
@@ -343,8 +353,13 @@ class EntrySerializer(serializers.Serializer[Entry]):
 
     def to_representation(self, instance: Entry) -> dict[str, Any]:
         # Confidence intervals are most of the bytes.
-        row = instance if self.context.get("has_intervals") else replace(instance, intervals={})
-        return super().to_representation(row)
+        edition = self.context.get("explained_by")
+        if not self.context.get("has_intervals"):
+            instance = replace(instance, intervals={})
+        elif edition is not None and instance.kind == "submission":
+            shown = explained(instance.intervals, instance.scores, edition=edition)
+            instance = replace(instance, intervals=shown)
+        return super().to_representation(instance)
 
 
 class BoardSerializer(serializers.Serializer[Board]):

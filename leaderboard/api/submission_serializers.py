@@ -17,7 +17,9 @@ from leaderboard.api.serializers import (
 )
 from leaderboard.methods.visibility import notice_of
 from leaderboard.models import Status, Visibility
+from leaderboard.statistics.missing_intervals import explained
 from leaderboard.submissions.outcomes import SubmissionView
+from leaderboard.submissions.progress import evaluation_of
 
 
 class QueueSerializer(serializers.Serializer[Any]):
@@ -115,6 +117,10 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
         submission, progress, position = instance.submission, instance.progress, instance.position
         method = submission.method
         is_waiting = progress.n_ahead is not None
+        intervals = instance.intervals
+        if progress.scores:
+            edition = evaluation_of(submission).edition
+            intervals = explained(intervals, progress.scores, edition=edition)
         return {
             "id": str(submission.pk),
             "state": progress.state,
@@ -141,9 +147,9 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
             "scores": progress.scores,
             "decimals": progress.decimals,
             "intervals": {
-                name: UncertaintySerializer(instance.intervals[name]).data
+                name: UncertaintySerializer(intervals[name]).data
                 for name in progress.scores or ()
-                if name in instance.intervals
+                if name in intervals
             },
             "awaits_intervals": instance.awaits_intervals,
             "rank": position.rank if position else None,

@@ -44,12 +44,16 @@ class Profile:
 
 @dataclass(frozen=True, slots=True)
 class ConfidenceInterval:
-    """The 95% confidence interval of a value, and its rank range; None until a worker has computed it."""
+    """The 95% confidence interval of a value, and its rank range; None until a worker has computed it.
+
+    `reason` says why there will be no interval, for readers who ask.
+    """
 
     low: float | None = None
     high: float | None = None
     rank_low: int | None = None
     rank_high: int | None = None
+    reason: str = ""
 
     @property
     def is_with_best(self) -> bool | None:

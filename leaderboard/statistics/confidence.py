@@ -29,6 +29,7 @@ from leaderboard import board_versions
 from leaderboard.boards.rows import printed_decimals
 from leaderboard.db import clock
 from leaderboard.models import (
+    Comparison,
     Edition,
     EditionRanges,
     Evaluation,
@@ -50,8 +51,10 @@ MAX_DELAY = timedelta(minutes=1)
 MAX_UNREADABLE = 5
 # A worker that dies while it computes leaves the work to others after this time.
 CLAIM_S = 300.0
-# Raise it when ranges or intervals are computed in another way: workers then compute them again.
+# Raise it when ranges, intervals or comparisons are computed in another way: workers then compute ranges and
+# comparisons again, and drop intervals that there are none of any more. Other intervals stay as published.
 _METHOD = 3
+_OF_METHOD = f"{_METHOD}:"
 # By the evaluation's id, of every column both ends, or None where there is no range.
 Ranges = dict[str, list[list[int] | None]]
 
@@ -142,9 +145,15 @@ class Entries:
 
     def _digest(self, lines: Sequence[str]) -> str:
         printed = sorted(map(repr, self.printed))
-        head = [f"method {_METHOD}", self.edition.ground_truth_id, self.edition.protocol]
+        head = [self.edition.ground_truth_id, self.edition.protocol]
         text = "\n".join([*head, *printed, *sorted(lines)])
-        return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+        return f"{_OF_METHOD}sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+
+    @property
+    def are_of_earlier_method(self) -> bool:
+        """Tell whether what is kept of the edition may have been computed in another way."""
+        digest = self.edition.inference_digest
+        return bool(digest) and not digest.startswith(_OF_METHOD)
 
     @property
     def have_ranges(self) -> bool:
@@ -205,13 +214,17 @@ def _claim(edition: Edition) -> bool:
 
 
 def _intervals(entries: Entries, *, between: Callable[[], None]) -> tuple[list[Score], list[Exception]]:
-    """Return the missing intervals, and what kept the files of some entries from being read."""
+    """Return the missing intervals, and what kept the files of some entries from being read.
+
+    Intervals of an earlier method that have to go are among them, without ends.
+    """
     edition = entries.edition
     usable = uncertainty.usable_columns(recording_sums.unit_counts_of(edition))
     column_of = {name: j for j, name in enumerate(edition.rules.score_names)}
     missing: dict[UUID, list[Score]] = {}
     # In random order: those whose file cannot be read at present keep no other waiting.
-    for score in Score.objects.filter(evaluation__edition=edition, low=None).order_by("?"):
+    scores = Score.objects.filter(evaluation__edition=edition)
+    for score in (scores if entries.are_of_earlier_method else scores.filter(low=None)).order_by("?"):
         if usable[column_of[score_name(score.metric, score.ttc_range)]]:
             missing.setdefault(score.evaluation_id, []).append(score)
     by_id = {row.evaluation_id: row for row in entries.rows}
@@ -220,8 +233,11 @@ def _intervals(entries: Entries, *, between: Callable[[], None]) -> tuple[list[S
     faults: list[Exception] = []
 
     def has_new(row: ScoredEntry, sums: Floats) -> bool:
-        columns = [column_of[score_name(each.metric, each.ttc_range)] for each in missing[row.evaluation_id]]
-        return bool((np.count_nonzero(sums[:, columns], axis=0) >= MIN_DIFFERENT).any())
+        is_enough = np.count_nonzero(sums, axis=0) >= MIN_DIFFERENT
+        return any(
+            is_enough[column_of[score_name(each.metric, each.ttc_range)]] == (each.low is None)
+            for each in missing[row.evaluation_id]
+        )
 
     readable = (pair for pair in _readable(edition, rows, faults=faults) if has_new(*pair))
     while some := list(itertools.islice(readable, uncertainty.BATCH)):
@@ -233,7 +249,11 @@ def _intervals(entries: Entries, *, between: Callable[[], None]) -> tuple[list[S
             for score in missing[row.evaluation_id]:
                 j = column_of[score_name(score.metric, score.ttc_range)]
                 # Where fewer than 6 units have an error there is none.
-                if np.isfinite(lows[i, j]):
+                if not np.isfinite(lows[i, j]):
+                    if score.low is not None:
+                        score.low, score.high = None, None
+                        made.append(score)
+                elif score.low is None:
                     score.low, score.high = (
                         rounded(ends[i, j], decimals=edition.decimals) for ends in (lows, highs)
                     )
@@ -292,7 +312,7 @@ def _published_values(edition: Edition, wanted: Sequence[UUID]) -> Floats:
 
 
 def _quoted(entries: Entries, counts: Floats) -> Quoted | None:
-    # Each value is as exact as printed: 14.8 is 14.75 to 14.85.
+    # Before it was rounded, a printed 14.8 was 14.75 to 14.85.
     values = np.array(entries.printed).reshape(-1, len(entries.edition.rules.score_names))
     if not len(values):
         return None
@@ -347,6 +367,9 @@ def _write(
         if not is_first or Entries.of(present).digest != entries.digest:
             return False
         Score.objects.bulk_update(intervals, ["low", "high"], batch_size=500)
+        if entries.are_of_earlier_method:
+            # They are shown until workers have computed them again.
+            Comparison.objects.filter(edition=edition).update(computed_at=None, begun_at=None)
         if ranges is not None:
             digest, of = ranges
             EditionRanges.objects.update_or_create(edition=edition, defaults={"digest": digest, "ranges": of})

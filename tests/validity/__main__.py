@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from tests import error_models
-from tests.validity import coverage, detectable, fields, percent, rare, worlds
+from tests.validity import coverage, detectable, fields, formulas, percent, rare, verdicts, worlds
 from tests.validity.coverage import Coverage, Shares
 
 N_RECORDINGS: Final = (20, 50, 100, 700)
@@ -69,6 +69,7 @@ RARE_HEAD: Final = (
 PAPERS_HEAD: Final = ("recordings", "correlation of methods", "all ranges hold beside 2 rows of papers")
 FAILING_HEAD: Final = ("failures", "recordings", "mean that fails", "difference: p < 0.05", "p ≤ 0.001")
 DETECTABLE_HEAD: Final = ("differences", "recordings", "detectable difference found", "90% / 10% quantile")
+VERDICTS_HEAD: Final = ("methods", "a winner by uncorrected p", "corrected for all pairs")
 DAYS_HEAD: Final = (
     "recordings",
     "of a day",
@@ -250,6 +251,30 @@ def detectable_rows(n: int) -> Iterator[Row]:
         yield name, n_recordings, percent(result.power, result.n), f"{result.ratio:.1f}"
 
 
+def formulas_rows(_n: int) -> Iterator[Row]:
+    """Figures that follow from formulas."""
+    yield from formulas.formulas()
+
+
+def verdicts_rows(n: int) -> Iterator[Row]:
+    """How often a page of a few methods of one mean names a winner; 150 recordings."""
+    fields_of = {
+        f"{n_methods} alike": (n_methods, worlds.in_days(1, 0.0, n_methods=n_methods)) for n_methods in (3, 5)
+    }
+    for name in ("informative", "one fails"):
+        fields_of[f"3, one odd: {name}"] = 3, worlds.one_odd(name, n_methods=3)
+    for name, (n_methods, draw) in fields_of.items():
+        result = verdicts.verdicts(
+            draw,
+            n_methods=n_methods,
+            n_recordings=150,
+            n=n // 6,
+            n_flips=N_SIGN_FLIPS,
+            rng=np.random.default_rng([n_methods, *name.encode()]),
+        )
+        yield name, percent(result.uncorrected, result.n), percent(result.corrected, result.n)
+
+
 def days_rows(n: int) -> Iterator[Row]:
     """The same shares where recordings of one day are alike, with recordings and with days as units."""
     for n_recordings, per_day, rho in DAYS:
@@ -280,6 +305,8 @@ TABLES: Final[dict[str, tuple[Row, Callable[[int], Iterator[Row]]]]] = {
     "failing": (FAILING_HEAD, failing_rows),
     "detectable": (DETECTABLE_HEAD, detectable_rows),
     "days": (DAYS_HEAD, days_rows),
+    "formulas": (("figure", "value"), formulas_rows),
+    "verdicts": (VERDICTS_HEAD, verdicts_rows),
 }
 
 

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 LIST = "/api/v1/submissions"
 BOARD = "/api/v1/splits/test/board"
-PARTS = {"low", "high", "rank_low", "rank_high", "is_with_best"}
+PARTS = {"low", "high", "rank_low", "rank_high", "is_with_best", "reason"}
 
 
 @pytest.fixture
