@@ -80,8 +80,8 @@ def _rank_ranges(table: BoardTable) -> str:
     if table.sources:
         without = (
             "A submission without a range can only have its rank (95% confidence); "
-            "rows quoted from papers never have a range. For this, a value quoted from a paper counts as if it "
-            "had a confidence interval as wide as that of the submission."
+            "rows quoted from papers never have a range. For this, a value quoted from a paper counts as if "
+            "it had a confidence interval as wide as that of the submission."
         )
         quoted = ", or a row quoted from a paper"
     else:
