@@ -27,3 +27,23 @@ def test_a_perfect_match_takes_the_whole_weight() -> None:
     assert scales.weighted_scale_ratio(np.array([0.8, 0.9, 1.0]), np.array([5.0, 0.0, 5.0])) == pytest.approx(
         0.9
     )
+
+
+def test_ranges_are_those_of_the_toolkit() -> None:
+    assert scales.SCALE_RANGES == {
+        1: (0.9, 1.08), 2: (0.8, 1.2), 3: (0.75, 1.25), 4: (0.7, 1.4), 5: (0.65, 1.5),
+    }  # fmt: skip
+
+
+def test_an_error_of_nothing_counts_as_a_millionth() -> None:
+    ratio = scales.weighted_scale_ratio(np.array([1.0, 2.0]), np.array([0.0, 1e-6]))
+    assert ratio == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("shift", [(-2, 1), (0, 0), (2, -2), (1, 2)])
+def test_the_best_shift_is_x_and_y_from_the_middle(shift: tuple[int, int]) -> None:
+    errors = np.full((2, 5, 5), 3.0)
+    errors[1, 2 + shift[1], 2 + shift[0]] = 1.0
+    least, shifts = scales.at_best_shifts(errors)
+    assert least.tolist() == [3.0, 1.0]
+    assert shifts[1].tolist() == list(shift)
