@@ -13,7 +13,15 @@ from evaluator.cli.connection import connect, unknown_split
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name
-from evaluator.cli.options import default_option, json_option, sendable, site_options, slug, url_option
+from evaluator.cli.options import (
+    default_option,
+    json_option,
+    sendable,
+    site_options,
+    slug,
+    tokens_page,
+    url_option,
+)
 from evaluator.cli.paths import keep_server_of_login, server_of_login
 from evaluator.cli.tokens import account, checked, forget_token, keep_token
 
@@ -71,9 +79,7 @@ def logout(*, url: str, as_json: bool) -> None:
     if as_json:
         echo_json({"server": url, "was_kept": was_kept})
     elif was_kept:
-        click.echo(
-            f"The token for {url} is removed from this machine. Revoke it at {url.rstrip('/')}/tokens/"
-        )
+        click.echo(f"The token for {url} is removed from this machine. Revoke it at {tokens_page(url)}")
     else:
         click.echo(f"There was no token for {url} on this machine.")
 
@@ -220,9 +226,7 @@ def _asked(url: str) -> str:
     """Ask for the token at a terminal, without echo, or read it from standard input."""
     if not sys.stdin.isatty():
         return sys.stdin.readline()
-    click.echo(
-        f"Create a token at {url.rstrip('/')}/tokens/ and paste it here; the input is hidden.", err=True
-    )
+    click.echo(f"Create a token at {tokens_page(url)} and paste it here; the input is hidden.", err=True)
     text: str = click.prompt("Token", hide_input=True, err=True)
     return text
 

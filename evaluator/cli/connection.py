@@ -14,7 +14,7 @@ import evaluator
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
 from evaluator.cli.layout import printable
-from evaluator.cli.options import NETWORK_TIMEOUT_S, TOKEN_VARIABLE, network_timeout_s
+from evaluator.cli.options import NETWORK_TIMEOUT_S, TOKEN_VARIABLE, network_timeout_s, site_of, tokens_page
 from evaluator.cli.tokens import token_for
 
 if TYPE_CHECKING:
@@ -216,13 +216,12 @@ def _words_for(error: Refused) -> str:
 def _hint_for(error: Refused, *, url: str) -> str:
     again = f"Try again in {duration(error.retry_after_s)}." if error.retry_after_s else ""
     if error.status == 401:
-        return f"Create a token at {url.rstrip('/')}/tokens/, then: tsttc login, or set {TOKEN_VARIABLE}."
+        return f"Create a token at {tokens_page(url)}, then: tsttc login, or set {TOKEN_VARIABLE}."
     if error.status == 403 and error.code in TOKENS_INSTEAD:
-        return f"{TOKENS_INSTEAD[error.code]} at {url.rstrip('/')}/tokens/"
+        return f"{TOKENS_INSTEAD[error.code]} at {tokens_page(url)}"
     if error.status == 404 and error.code != "no-ground-truth":
-        path = urlsplit(url).path.strip("/")
-        site = url.rstrip("/").removesuffix(path).rstrip("/")
-        elsewhere = f" The address is that of the site, such as {site}." if path else ""
+        site = site_of(url)
+        elsewhere = f" The address is that of the site, such as {site}." if site != url.rstrip("/") else ""
         return f"Check the name, or the id, and --server.{elsewhere}"
     if error.status == 429:
         return again or "Show your quota with: tsttc quota"

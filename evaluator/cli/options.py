@@ -134,3 +134,18 @@ def _site(_context: click.Context, _parameter: click.Parameter, value: str) -> s
             f"expected only the address of the site; a token belongs in the variable {TOKEN_VARIABLE}."
         )
     return value
+
+
+def site_of(url: str) -> str:
+    """Return the address of the site itself: a leaderboard is at the root of its host.
+
+    >>> site_of("https://leaderboard.example.org/api/v1/"), site_of("http://127.0.0.1:8000")
+    ('https://leaderboard.example.org', 'http://127.0.0.1:8000')
+    """
+    path = urlsplit(url).path.strip("/")
+    return url.rstrip("/").removesuffix(path).rstrip("/")
+
+
+def tokens_page(url: str) -> str:
+    """Return the page on which a person creates and revokes tokens."""
+    return f"{site_of(url)}/tokens/"

@@ -94,6 +94,8 @@ def verify(*, receipt_path: Path, keys_path: Path | None, url: str, as_json: boo
                 code="no-server",
                 hint=_with_keys_of(site, receipt_path),
             )
+        if not site:
+            _require_receipt(data)
         with connect(url, with_token=False) as client:
             keys_data = client.receipt_keys()
     try:
@@ -113,6 +115,17 @@ def verify(*, receipt_path: Path, keys_path: Path | None, url: str, as_json: boo
         click.echo(
             f"Note: the receipt names {printable(receipt.site)}; the keys are those of {url}.", err=True
         )
+
+
+def _require_receipt(data: bytes) -> None:
+    """Raise `Failure` for what is no receipt by its form: no site needs to be asked about it."""
+    from evaluator.receipts import NotVerified, verify  # noqa: PLC0415 -- as above
+
+    try:
+        verify(data, {})
+    except NotVerified as fault:
+        if fault.code == "receipt-malformed":
+            raise Failure(str(fault), exit_code=Exit.REJECTED, code=fault.code) from None
 
 
 def _is_nobody_s(url: str) -> bool:

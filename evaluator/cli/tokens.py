@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
-from evaluator.cli.options import TOKEN_VARIABLE
+from evaluator.cli.options import TOKEN_VARIABLE, tokens_page
 from evaluator.cli.paths import settings_file
 from evaluator.texts import text_of
 
@@ -68,7 +68,7 @@ def _no_token(words: str, url: str) -> Failure:
         words,
         exit_code=Exit.AUTH,
         code="no-token",
-        hint=f"Create one at {url.rstrip('/')}/tokens/, then: tsttc login, or export {TOKEN_VARIABLE}=…",
+        hint=f"Create one at {tokens_page(url)}, then: tsttc login, or export {TOKEN_VARIABLE}=…",
     )
 
 

@@ -256,6 +256,17 @@ def test_verify_of_a_reviewer_without_a_login_names_the_site_of_the_receipt(
     assert (other.exit_code, command in other.stderr) == (1, True), "the keys of another site"
 
 
+@pytest.mark.parametrize("text", ["", "x", "{}", "a.b.c", "<html></html>", "\0" * 99])
+def test_what_is_no_receipt_is_called_so_without_asking_a_site(
+    tsttc: Tsttc, site: RecordedSite, receipt: Path, text: str
+) -> None:
+    receipt.write_text(text)
+    for more in ((), ("--server", site.url)):
+        result = tsttc("verify", receipt, *more)
+        assert (result.exit_code, site.requests) == (1, [])
+        assert "This is not a receipt" in result.stderr
+
+
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-be"])
 def test_receipts_and_keys_of_any_editor_are_read(
     tsttc: Tsttc, receipt: Path, tmp_path: Path, encoding: str

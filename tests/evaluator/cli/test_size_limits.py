@@ -54,6 +54,14 @@ def test_an_address_with_a_path_is_answered_with_that_of_the_site(path: str) -> 
     failure = in_words(_refused(**refusal, detail="Nothing."), url=f"{site}{path}")
     assert failure.hint.endswith(f"The address is that of the site, such as {site}.")
     assert "such as" not in in_words(_refused(**refusal, detail="Nothing."), url=site).hint
+    unknown = refusal | {"status": 401, "code": "not-authenticated"}
+    assert f"{site}/tokens/," in in_words(_refused(**unknown, detail="No."), url=f"{site}{path}").hint
+
+
+@pytest.mark.parametrize("path", ["/api/v1", "/board/demo/"])
+def test_without_a_token_the_page_of_tokens_is_named_whatever_the_path(tsttc: Tsttc, path: str) -> None:
+    result = tsttc("quota", "--server", f"https://a.example{path}")
+    assert (result.exit_code, "https://a.example/tokens/," in result.stderr) == (4, True)
 
 
 def _refused(**fields: object) -> Refused:
