@@ -134,6 +134,7 @@ def writes_a_status(call: ast.Call) -> bool:
     return name in writers and "status" in names
 
 
+@pytest.mark.slow
 def test_only_lifecycle_writes_a_status() -> None:
     writes = {path: status_writes(tree(path)) for path in written_by_hand("leaderboard")}
     assert {path for path, lines in writes.items() if lines} == STATUS_WRITERS
@@ -171,6 +172,7 @@ def locks_with_the_key(module: ast.Module) -> list[int]:
     ]
 
 
+@pytest.mark.slow
 def test_no_row_is_locked_with_its_key() -> None:
     locks = {path: locks_with_the_key(tree(path)) for path in written_by_hand("leaderboard")}
     assert {path: lines for path, lines in locks.items() if lines} == {}
@@ -193,6 +195,7 @@ def bad_habits(module: ast.Module, *, is_model: bool) -> set[str]:
     return habits
 
 
+@pytest.mark.slow
 def test_no_signal_is_connected_and_no_save_is_overridden() -> None:
     habits_by_path = {
         path: bad_habits(tree(path), is_model="models" in path.parts) for path in python_files(*PROGRAMS)

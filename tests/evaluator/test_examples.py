@@ -11,6 +11,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 import click
+import pytest
 
 from evaluator import TTC_RANGES, evaluate, read_predictions, read_truth
 from evaluator.cli import own_commands
@@ -43,6 +44,7 @@ def test_arrays_come_straight_to_a_report(tmp_path: Path) -> None:
     assert lines[1].endswith("of 60 sequences")
 
 
+@pytest.mark.slow
 def test_a_frame_comes_straight_to_a_report(tmp_path: Path) -> None:
     values = dict(line.split() for line in printed(EXAMPLES / "from_frame.py", tmp_path))
     assert len(values) == 2 * (1 + len(TTC_RANGES))
@@ -88,6 +90,7 @@ def test_every_program_is_named_where_the_examples_are_and_on_the_page() -> None
         assert [path.name for path in PROGRAMS if f"`{path.name}`" not in text] == []
 
 
+@pytest.mark.slow
 def test_lines_of_the_pages_about_python_and_models_run_in_a_copy_of_the_examples(tmp_path: Path) -> None:
     shutil.copytree(EXAMPLES, tmp_path / "examples")
     program = tmp_path / "page.py"

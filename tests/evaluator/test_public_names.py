@@ -29,6 +29,7 @@ def test_docstrings_name_what_is_public() -> None:
         assert [name for name in package.__all__ if f"`{name}`" not in words and name != "__version__"] == []
 
 
+@pytest.mark.slow
 def test_help_describes_the_functions() -> None:
     text = output_of("import evaluator, pydoc; print(pydoc.render_doc(evaluator, renderer=pydoc.plaintext))")
     assert "read_predictions(" in text

@@ -61,6 +61,7 @@ def public_addresses(client: Client, entry: Submission) -> list[str]:
     return [*(each for each in listed if not DOCUMENTS.match(each)), *exports, *more]
 
 
+@pytest.mark.slow
 def test_a_site_with_another_file_says_nothing_of_our_benchmark(
     client: Client, entries: list[Submission], settings: Settings, tmp_path: Path
 ) -> None:
@@ -154,6 +155,7 @@ def test_a_fault_is_named_with_file_key_and_expectation(
     assert problem in str(error.value)
 
 
+@pytest.mark.slow
 def test_a_process_starts_with_the_file_of_its_variable_or_says_what_is_wrong(tmp_path: Path) -> None:
     def started(**variables: str) -> subprocess.CompletedProcess[str]:
         code = (

@@ -8,6 +8,7 @@ from tests.security import probing
 SIZE = {"n_sequences": 28_600, "n_recordings": 100}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("base", probing.BASES, ids=lambda base: base.name.partition(":")[0])
 def test_a_decimal_less_tells_less_of_the_chosen_labels(base: probing.Base) -> None:
     means_by_way = probing.measured(n_chosen=8, n_readouts=2, base=base, **SIZE)

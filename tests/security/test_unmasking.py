@@ -4,6 +4,7 @@ from pathlib import Path
 from uuid import UUID
 
 import numpy as np
+import pytest
 from django.db import transaction
 from django.test import Client
 
@@ -46,6 +47,7 @@ def correlation(client: Client, *methods: UUID) -> float | None:
     return float((widths[0] ** 2 + widths[1] ** 2 - between**2) / (2 * widths[0] * widths[1]))
 
 
+@pytest.mark.slow
 def test_an_anonymous_successor_is_not_linked_to_its_predecessor(
     client: Client, benchmark: None, owner: User, tmp_path: Path
 ) -> None:

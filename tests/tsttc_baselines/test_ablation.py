@@ -11,8 +11,6 @@ from tsttc_baselines.folders import read_folder
 from tsttc_baselines.rendering.folders import write_folder
 from tsttc_baselines.simulation import split
 
-pytestmark = pytest.mark.slow
-
 N = 8
 
 

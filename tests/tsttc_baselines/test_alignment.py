@@ -18,6 +18,7 @@ def alpha(clip: Clip, frame_gap: int = TARGET) -> float:
     return align(clip, frame_gap=frame_gap).scale_ratio
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale_ratio", [0.68, 0.8, 0.9, 0.97, 1.0, 1.06, 1.2, 1.45])
 def test_a_planted_scale_ratio_is_recovered(scale_ratio: float) -> None:
     assert alpha(planted(scale_ratio)) == pytest.approx(scale_ratio, abs=1e-3)
@@ -78,6 +79,7 @@ def test_a_box_at_the_edge_of_the_image_is_aligned_with_what_is_there() -> None:
     assert alpha(cut) == pytest.approx(0.9, abs=0.03)
 
 
+@pytest.mark.slow
 def test_the_error_on_real_frames_is_at_most_11_5_mid(real_clips: tuple[list[Clip], Floats]) -> None:
     clips, ttc_s = real_clips
     assert mean_mid([alpha(clip) for clip in clips], ttc_s) <= 11.5

@@ -22,7 +22,6 @@ from tests.tsttc_baselines.made_folders import image_path, made_folder
 from tsttc_baselines.journals import Journal
 
 pytestmark = [
-    pytest.mark.slow,
     pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes"),
 ]
 
@@ -89,6 +88,7 @@ def predictions_of(tsttc: Tsttc, folder: Path, name: str) -> dict[str, float]:
     return predictions
 
 
+@pytest.mark.slow
 def test_a_killed_run_leaves_no_process_and_continues(folder: Path, tsttc: Tsttc) -> None:
     with waiting_run(folder) as (process, end):
         process.kill()
@@ -100,6 +100,7 @@ def test_a_killed_run_leaves_no_process_and_continues(folder: Path, tsttc: Tsttc
     assert {path.name for path in folder.parent.iterdir()} == {"in", "p.json", "whole.json"}
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_run_at_once_and_in_words(folder: Path) -> None:
     with waiting_run(folder) as (process, end):
         os.killpg(process.pid, signal.SIGINT)
@@ -111,6 +112,7 @@ def test_ctrl_c_ends_a_run_at_once_and_in_words(folder: Path) -> None:
     assert (folder.parent / "p.json.part").exists()
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_is_reported_in_words(folder: Path) -> None:
     with waiting_run(folder) as (process, end):
         for child in children_of(process.pid):

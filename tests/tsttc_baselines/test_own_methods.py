@@ -152,6 +152,7 @@ def test_what_cannot_run_is_named_at_once(here: Path, words: tuple[str, ...], me
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("at", "cause"),
     [

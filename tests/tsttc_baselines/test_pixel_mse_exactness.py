@@ -13,9 +13,8 @@ from tsttc_baselines.clips import TARGET, Image
 from tsttc_baselines.pixel_mse import Comparison
 from tsttc_baselines.scales import scale_bins
 
-pytestmark = pytest.mark.slow
 
-
+@pytest.mark.slow
 @settings(max_examples=12)
 @given(
     seed=st.integers(0, 1000),

@@ -12,8 +12,6 @@ from tsttc_baselines.clips import Clip
 from tsttc_baselines.estimates import Estimator
 from tsttc_baselines.pixel_mse import SEARCHES, PixelMse
 
-pytestmark = pytest.mark.slow
-
 Real = tuple[list[Clip], Floats]
 
 
@@ -47,6 +45,7 @@ def test_the_papers_variant_reaches_its_errors_on_real_frames(real_clips: Real, 
     assert np.mean(RTE.errors(scale_ratio_to_ttc(estimates, fps_hz=fps_of_gap(5)), real_clips[1])) <= 21
 
 
+@pytest.mark.slow
 def test_the_toolkits_variant_is_worse_as_it_should_be(real_clips: Real) -> None:
     assert 19 <= mid(real_clips, PixelMse(variant="toolkit")) <= 30
 
@@ -56,6 +55,7 @@ def test_shifts_halve_the_error_where_boxes_are_loose(real_clips: Real) -> None:
     assert mid(loose, PixelMse(shift=0)) >= 2 * mid(loose, PixelMse(shift=3))
 
 
+@pytest.mark.slow
 def test_the_error_falls_with_every_frame_of_gap(real_clips: Real) -> None:
     errors = [mid(real_clips, PixelMse(), frame_gap=gap) for gap in range(1, 6)]
     assert all(wider < narrower for narrower, wider in itertools.pairwise(errors))

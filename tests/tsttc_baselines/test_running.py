@@ -222,6 +222,7 @@ def end_after(n_sequences: int) -> Callable[[int], None]:
     return progress
 
 
+@pytest.mark.slow
 def test_an_ended_run_continues_and_gives_the_same_file(folder: Path) -> None:
     estimate(folder, out="whole.json")
     with pytest.raises(Ended):

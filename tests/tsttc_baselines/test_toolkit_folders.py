@@ -69,6 +69,7 @@ def test_a_run_over_a_download_is_a_file_for_any_manifest_of_its_sequences(tmp_p
     )
 
 
+@pytest.mark.slow
 def test_a_manifest_beside_the_files_gives_the_order_and_the_anno_ids_that_are_asked_for(
     tmp_path: Path,
 ) -> None:

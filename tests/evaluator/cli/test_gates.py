@@ -13,7 +13,7 @@ from evaluator.metrics.protocol import SCORE_NAMES
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply
 from tests.evaluator.worlds import EXAMPLES, Tsttc
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("at_site")]
+pytestmark = [pytest.mark.usefixtures("at_site")]
 
 ID = "1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11"
 METHOD, OTHER = "5d2c1f8e-0b7a-4c36-9f41-7a3e6b9d2c10", "8c1e2b9a-3f47-4d0c-a6e1-5b7d90c2e4f6"

@@ -15,7 +15,7 @@ from evaluator.tables.formats import parquet_of
 from tests.evaluator.cli.recorded_site import CUT, RecordedSite, Reply, problem
 from tests.evaluator.worlds import EXAMPLES, Tsttc
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("at_site")]
+pytestmark = [pytest.mark.usefixtures("at_site")]
 
 MANIFEST = EXAMPLES / "manifest.csv"
 ID = "1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11"

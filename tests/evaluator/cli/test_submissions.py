@@ -58,7 +58,7 @@ REJECTED = QUEUED | {
 }
 
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("at_site")]
+pytestmark = [pytest.mark.usefixtures("at_site")]
 
 
 def submit(tsttc: Tsttc, *more: object) -> Result:

@@ -15,8 +15,6 @@ from tests.evaluator.client.test_client import ONE, QUEUED, SCORED, SUBMISSIONS,
 from tests.evaluator.fake_time import FakeTime
 from tests.services import free_port
 
-pytestmark = pytest.mark.slow
-
 
 def test_watch_gives_every_state_until_the_final_one(client: Client, site: RecordedSite) -> None:
     queued = QUEUED | {"queue": {"ahead": 2}}

@@ -196,6 +196,7 @@ def test_a_file_of_an_earlier_edition_is_warned_of_by_score(
 # --- all good files that are here -----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_demo_s_runs_are_not_warned_of_and_the_run_on_areas_is() -> None:
     truth = runs.demo_split().truth
     for run in runs.RUNS:

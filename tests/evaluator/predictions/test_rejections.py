@@ -103,6 +103,7 @@ def test_every_code_of_prediction_files_has_a_case_here() -> None:
 HOSTILE_STRINGS = b"\xef\xbb\xbf" + '["\U0001f600",'.encode() + b'""[' * 100_000
 
 
+@pytest.mark.slow
 def test_a_file_of_strings_and_brackets_takes_a_few_times_its_size() -> None:
     tracemalloc.start()
     try:

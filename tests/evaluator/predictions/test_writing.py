@@ -61,6 +61,7 @@ def test_keys_may_be_given_instead_of_a_manifest(keys: list[str | int]) -> None:
     assert read(write_predictions(keys=keys, ttc_s=TTC_S)) == TTC_S
 
 
+@pytest.mark.slow
 @given(values=st.lists(st.floats(allow_nan=False).filter(bool), min_size=1, max_size=30))
 def test_every_value_reads_back_exactly(values: list[float]) -> None:
     manifest = make_truth([4.0] * len(values)).manifest

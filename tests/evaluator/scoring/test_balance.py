@@ -51,6 +51,7 @@ def test_the_statistic_is_near_the_level_what_the_rate_of_large_deviations_says(
         assert rate(gaps, total) == pytest.approx(wanted, rel=0.04)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", [(1.0,), (1.0, 0.6), (1.0, 1.0, 1.0)])
 def test_sums_with_one_statistic_are_about_as_rare_in_every_pair(sizes: tuple[float, ...]) -> None:
     """Of max-t they are not: where one recording dominates, t above 2 may never occur."""

@@ -116,6 +116,7 @@ def test_few_recordings_exclude_no_difference() -> None:
 # --- as it is published ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(
     first=st.floats(0, 50),

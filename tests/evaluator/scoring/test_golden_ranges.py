@@ -47,6 +47,7 @@ def recorded(case: dict[str, dict[str, int]]) -> dict[str, object]:
     return {"board": case["board"], "first": first, "digest": digest(ranges)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", GOLDEN, ids=lambda case: case["board"]["n_entries"])
 def test_ranges_of_large_boards_are_those_that_were_recorded(case: dict[str, dict[str, int]]) -> None:
     assert recorded(case) == case

@@ -13,8 +13,6 @@ from tests.error_models import Drawn, Model
 from tests.validity import coverage, fields, margin, rare, worlds
 from tests.validity.coverage import Coverage
 
-pytestmark = pytest.mark.slow
-
 # Cells in which no interval of this kind holds 95%: docs/validation.md gives their coverage.
 SKEWED = {"Pareto", "unequal"}
 
@@ -70,6 +68,7 @@ def test_a_test_of_single_sequences_is_wrong_most_of_the_time() -> None:
     assert coverage.by_sequences(0.2, n_recordings=100, n=100, rng=rng) > 0.4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("field", fields.LEVELS)
 @pytest.mark.parametrize("n_recordings", [100, 700])
 def test_rank_ranges_hold_the_true_ranks(n_recordings: int, field: str) -> None:
@@ -101,6 +100,7 @@ def test_all_rank_ranges_hold_at_once_beside_a_quoted_row(n_methods: int, correl
     assert ranks.all_at_once >= 0.88 - margin(0.88, 100)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_recordings", [40, 150])
 def test_rank_ranges_hold_where_one_recording_has_most_of_each_methods_error(n_recordings: int) -> None:
     draw, rng = worlds.dominated(n_methods=6), np.random.default_rng([6, n_recordings])

@@ -12,8 +12,6 @@ from evaluator.truth.numbering import read_numbering
 from tests.evaluator.toolkit_folders import driving_folder, list_backwards, toolkit_results
 from tests.evaluator.worlds import Tsttc, flat
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -30,6 +28,7 @@ def results(folder: Path, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_numbers_are_those_of_the_toolkit_in_whatever_order_files_are_listed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -40,6 +39,7 @@ def test_numbers_are_those_of_the_toolkit_in_whatever_order_files_are_listed(
         list_backwards(monkeypatch)
 
 
+@pytest.mark.slow
 def test_sequences_that_change_their_number_are_counted(folder: Path) -> None:
     numbering = read_numbering(folder)
     keys = read_manifest(folder).natural_keys
@@ -47,6 +47,7 @@ def test_sequences_that_change_their_number_are_counted(folder: Path) -> None:
     assert numbering.n_renumbered == len(differing) > 300
 
 
+@pytest.mark.slow
 def test_results_of_the_toolkit_score_what_they_are_worth_once_they_have_natural_keys(
     tsttc: Tsttc, folder: Path, results: Path, tmp_path: Path
 ) -> None:
@@ -62,6 +63,7 @@ def test_results_of_the_toolkit_score_what_they_are_worth_once_they_have_natural
     assert worth.scores["overall"].rte > 20
 
 
+@pytest.mark.slow
 def test_check_warns_of_the_toolkit_s_numbers_with_the_command_that_mends_them(
     tsttc: Tsttc, folder: Path, results: Path
 ) -> None:
@@ -83,6 +85,7 @@ def test_check_warns_of_the_toolkit_s_numbers_with_the_command_that_mends_them(
     assert document["n_renumbered"] == n_renumbered
 
 
+@pytest.mark.slow
 def test_manifest_of_a_folder_says_how_the_toolkit_numbers_it(tsttc: Tsttc, folder: Path) -> None:
     n_renumbered = read_numbering(folder).n_renumbered
     made = tsttc("manifest", folder)
@@ -90,6 +93,7 @@ def test_manifest_of_a_folder_says_how_the_toolkit_numbers_it(tsttc: Tsttc, fold
     assert json.loads(tsttc("manifest", folder, "--json").stdout)["n_renumbered"] == n_renumbered
 
 
+@pytest.mark.slow
 def test_order_is_checked_against_the_split_s_manifest(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:
     manifest = tmp_path / "manifest.csv"
     manifest.write_bytes(read_manifest(folder).to_csv())

@@ -7,7 +7,7 @@ from leaderboard.models import Edition, Submission, User
 from tests import builders
 from tests.leaderboard.api.test_submissions import client_of
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("open_values")]
+pytestmark = [pytest.mark.usefixtures("open_values")]
 
 
 def address(*methods: object, split: str = "test", more: str = "") -> str:
@@ -15,6 +15,7 @@ def address(*methods: object, split: str = "test", more: str = "") -> str:
     return f"/api/v1/compare?split={split}{named}{more}"
 
 
+@pytest.mark.slow
 def test_comparison_is_a_202_until_a_worker_has_computed_it(entries: list[Submission], owner: User) -> None:
     client = client_of(owner)
     ids = [str(entry.method_id) for entry in entries[:3]]

@@ -14,8 +14,6 @@ from tests import builders
 from tests.editions import corrected, open_edition, publish
 from tests.leaderboard.api.test_submissions import client_of
 
-pytestmark = pytest.mark.slow
-
 LIST = "/api/v1/submissions"
 BOARD = "/api/v1/splits/test/board"
 PARTS = {"low", "high", "rank_low", "rank_high", "is_with_best", "reason"}

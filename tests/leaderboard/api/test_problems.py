@@ -112,6 +112,7 @@ def test_malformed_requests_are_answered_alike_before_any_view(db: None, setting
 # --- pagination ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_pages_of_a_list_have_every_row_once_also_while_rows_come(edition: Edition, owner: User) -> None:
     client, data = client_of(owner), builders.predictions(edition)
     made = [str(builders.submit(owner, data, method=f"M{n}").pk) for n in range(7)]

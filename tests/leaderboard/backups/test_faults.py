@@ -19,7 +19,7 @@ from leaderboard.storage import files, hidden_marks, seeds, truth_values
 from tests import builders
 from tests.leaderboard.ops.test_prometheus import figures
 
-pytestmark = [pytest.mark.slow, pytest.mark.django_db(transaction=True)]
+pytestmark = [pytest.mark.django_db(transaction=True)]
 
 
 @pytest.fixture

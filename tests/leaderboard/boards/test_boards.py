@@ -11,8 +11,6 @@ from leaderboard.boards import listing
 from leaderboard.models import Edition, Method, PublishedResult, Split, Submission, User, Visibility
 from tests import builders
 
-pytestmark = pytest.mark.slow
-
 ANYBODY = AnonymousUser()
 
 

@@ -17,8 +17,6 @@ from leaderboard.models import Edition, Split, Submission, User
 from tests import builders
 from tests.editions import publish
 
-pytestmark = pytest.mark.slow
-
 
 def open_again(*, decimals: int) -> Edition:
     Split.objects.filter(pk="test").update(decimals=decimals)
@@ -56,6 +54,7 @@ def test_other_decimals_than_one_and_two_are_refused_by_the_database(edition: Ed
         Split.objects.update(decimals=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("decimals", [1, 2])
 def test_every_form_has_the_editions_decimals(
     benchmark: None, tmp_path: Path, owner: User, client: Client, decimals: int

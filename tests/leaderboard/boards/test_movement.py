@@ -12,8 +12,6 @@ from leaderboard.models import Edition, Evaluation, Method, Publication, Split, 
 from tests import board_rows, builders, pages
 from tests.caching import forget_boards
 
-pytestmark = pytest.mark.slow
-
 NEW = "Submitted or published less than 14 days ago"
 
 

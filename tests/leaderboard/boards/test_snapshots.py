@@ -30,8 +30,6 @@ from tests.caching import forget_boards
 from tests.editions import corrected, open_edition, publish
 from tests.public_pages import addresses_of
 
-pytestmark = pytest.mark.slow
-
 API = "/api/v1/splits/test/board"
 PAGE = "/board/test/"
 MAX_QUERIES, MAX_QUERIES_AS_OF = 4, 9
@@ -155,6 +153,7 @@ def test_editions_in_preparation_move_no_number(
 # --- what it costs -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [3, 300])
 def test_a_public_page_takes_four_statements_whatever_its_size(
     edition: Edition, owner: User, client: Client, n: int

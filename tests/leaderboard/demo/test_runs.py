@@ -16,10 +16,10 @@ from leaderboard.demo import runs
 from leaderboard.demo.runs import FRAMES, N_SEQUENCES, RUNS
 from tests.evaluator.worlds import REPOSITORY
 
-pytestmark = pytest.mark.slow
 TOLERANCE = 2e-4
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_description_make_the_kept_estimates(tmp_path: Path) -> None:
     first, count = 14_000, 3
     part = ["--first", str(first), "--count", str(count), "--jobs", "1"]
@@ -45,6 +45,7 @@ def test_every_sequence_has_an_estimate_that_can_be_submitted() -> None:
         assert ((kept > 0) & (kept < 10)).all()
 
 
+@pytest.mark.slow
 def test_methods_come_in_the_order_of_the_paper() -> None:
     ttc_s = runs.demo_split().truth.ttc_s
     errors = {
@@ -54,6 +55,7 @@ def test_methods_come_in_the_order_of_the_paper() -> None:
     assert errors["pixel-mse"] < errors["detection-height"] < errors["detection-area"]
 
 
+@pytest.mark.slow
 def test_the_demo_needs_no_opencv() -> None:
     program = """
 import sys; sys.modules["cv2"] = None

@@ -23,8 +23,6 @@ from tests import builders, pages
 from tests.editions import FACTORS, open_edition, publish
 from tests.leaderboard.api.test_submissions import client_of, post
 
-pytestmark = pytest.mark.slow
-
 ABSOLUTE = Metric(
     "absolute",
     "AE",
@@ -85,6 +83,7 @@ def document(client: Any, address: str) -> dict[str, Any]:
     return dict(response.json())
 
 
+@pytest.mark.slow
 def test_a_further_range_and_a_third_metric_stand_wherever_their_edition_is_shown(
     far: Submission, old_receipt: bytes, owner: User, client: Client
 ) -> None:

@@ -18,8 +18,6 @@ from tests.editions import FACTORS
 from tests.leaderboard.api.test_submissions import client_of
 from tests.security.crawler import crawl
 
-pytestmark = pytest.mark.slow
-
 APPROACHING = TTCRange("approaching", 0.0, 5.0, is_low_open=True)
 LEAVING = TTCRange("leaving", -20.0, 0.0, is_high_open=True)
 OF_OTHERS = Protocol(
@@ -51,6 +49,7 @@ def board(
     return edition
 
 
+@pytest.mark.slow
 def test_nothing_that_is_shown_of_a_split_says_what_its_protocol_does_not_have(
     board: Edition, owner: User, maintainer: User
 ) -> None:
@@ -110,6 +109,7 @@ def test_counts_follow_the_protocol_of_the_edition(board: Edition, client: Clien
     assert answer[0]["n_out_of_range"] == board.n_out_of_range
 
 
+@pytest.mark.slow
 def test_another_protocol_changes_no_byte_of_what_there_is(
     entries: list[Submission], owner: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:

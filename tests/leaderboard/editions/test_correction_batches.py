@@ -16,8 +16,6 @@ from leaderboard.storage import files, truth_values
 from tests import builders, crowd
 from tests.leaderboard.web.maintain import queue_rows
 
-pytestmark = pytest.mark.slow
-
 N_SUBMISSIONS = 150
 
 
@@ -49,6 +47,7 @@ def assert_all_scored_once(edition: Edition) -> None:
     assert len(decided) == len(set(decided)) == N_SUBMISSIONS
 
 
+@pytest.mark.slow
 def test_a_worker_that_comes_back_with_a_batch_that_others_finished_changes_nothing(edition: Edition) -> None:
     zombie = claim_batch()
     for lease in zombie:
@@ -63,6 +62,7 @@ def test_a_worker_that_comes_back_with_a_batch_that_others_finished_changes_noth
     assert list(attempts.values()).count(1) == N_SUBMISSIONS - len(zombie)
 
 
+@pytest.mark.slow
 def test_a_batch_of_which_a_part_was_taken_away_is_stored_without_that_part(edition: Edition) -> None:
     leases = claim_batch()
     taken, kept = leases[:7], leases[7:]
@@ -77,6 +77,7 @@ def test_a_batch_of_which_a_part_was_taken_away_is_stored_without_that_part(edit
     assert_all_scored_once(edition)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("left", [None, b"", b"\0" * 17], ids=["none", "empty", "cut off"])
 def test_a_file_without_its_kept_values_is_read_again_beside_the_batch(
     edition: Edition, left: bytes | None

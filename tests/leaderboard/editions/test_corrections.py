@@ -28,8 +28,6 @@ from leaderboard.storage import files, truth_values
 from tests import builders
 from tests.editions import FACTORS, board_now, corrected, open_edition, publish, roll_back
 
-pytestmark = pytest.mark.slow
-
 
 def test_opening_queues_every_active_submission_once_and_changes_nothing_public(
     entries: list[Submission], tmp_path: Path

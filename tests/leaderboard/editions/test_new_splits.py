@@ -19,8 +19,6 @@ from tests.editions import corrected, open_edition, publish
 from tests.leaderboard.web.maintain.desk import get
 from tests.leaderboard.web.test_every_page import assert_sound
 
-pytestmark = pytest.mark.slow
-
 SPLITS, ADD = "/maintain/splits/", "/maintain/splits/add/"
 NEW = {
     "name": "challenge-2027",
@@ -365,6 +363,7 @@ def test_an_archived_split_keeps_its_board_and_takes_no_file(
     assert (split_rows[-1]["is_open"], split_rows[-1]["is_archived"]) == (False, True)
 
 
+@pytest.mark.slow
 def test_a_split_that_is_switched_off_is_on_no_page_form_list_or_sitemap(
     client: Client, val_entry: Submission, owner: User
 ) -> None:
@@ -396,6 +395,7 @@ def test_a_split_that_is_switched_off_is_on_no_page_form_list_or_sitemap(
 # --- a line with an end ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client, edition: Edition) -> None:
     page, text = "/maintain/announcement/", "Maintenance <b>today</b>, 8:00 UTC."
     visitor = Client()

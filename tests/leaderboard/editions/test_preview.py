@@ -21,8 +21,6 @@ from leaderboard.upkeep import backlog
 from tests import builders
 from tests.editions import board_now, corrected, extended, offline, open_edition, publish
 
-pytestmark = pytest.mark.slow
-
 
 def test_preview_compares_entry_by_entry(entries: list[Submission], tmp_path: Path) -> None:
     path = corrected(tmp_path, factor=1.3)
@@ -68,6 +66,7 @@ def test_what_is_rejected_in_both_editions_is_not_changed(
     assert preview.document(comparison)["n_changed"] == 4
 
 
+@pytest.mark.slow
 def test_counts_are_against_the_edition_that_is_named_whatever_was_the_board_at_import(
     entries: list[Submission], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

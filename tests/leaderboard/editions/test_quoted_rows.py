@@ -58,6 +58,7 @@ def former(edition: Edition, tmp_path: Path) -> Edition:
     return edition
 
 
+@pytest.mark.slow
 def test_a_row_that_is_added_or_replaced_changes_no_board_of_the_past_and_no_former_edition(
     client: Client, former: Edition
 ) -> None:

@@ -17,8 +17,6 @@ from tests import builders
 from tests.editions import extended, open_edition, publish, roll_back
 from tests.leaderboard.web.test_every_page import assert_sound
 
-pytestmark = pytest.mark.slow
-
 PUBLISH = "/maintain/test/editions/2/publish/"
 
 

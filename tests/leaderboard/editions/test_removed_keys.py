@@ -12,8 +12,6 @@ from leaderboard.storage import truth_values
 from tests import builders
 from tests.editions import corrected, extended, open_edition, publish, roll_back
 
-pytestmark = pytest.mark.slow
-
 
 def problem_of(user: User, predictions: dict[str, float] | bytes) -> str:
     """The first problem of a file that is sent now."""
@@ -37,6 +35,7 @@ def csv(predictions: dict[str, float]) -> bytes:
     ).encode()
 
 
+@pytest.mark.slow
 def test_a_removed_sequence_is_named_as_such_with_the_edition(
     edition: Edition, owner: User, tmp_path: Path
 ) -> None:
@@ -71,6 +70,7 @@ def by_anno_id(edition: Edition) -> dict[str, float]:
     return dict(zip(truth.manifest.anno_id_keys, truth.ttc_s.tolist(), strict=True))
 
 
+@pytest.mark.slow
 def test_a_file_that_fits_an_earlier_edition_gets_the_command_that_repairs_it(
     edition: Edition, owner: User, tmp_path: Path
 ) -> None:
@@ -95,6 +95,7 @@ def test_a_file_that_lacks_the_sequences_of_a_new_edition_gets_it_too(
     assert former.advice(split="test", edition=1, keys="anno_id") in problem_of(owner, numbered)
 
 
+@pytest.mark.slow
 def test_a_file_of_another_split_is_named_as_such(edition: Edition, owner: User, tmp_path: Path) -> None:
     val = builders.import_truth(tmp_path, split="val", seed=3)
     off = builders.import_truth(tmp_path, split="demo", seed=4)

@@ -21,8 +21,6 @@ from leaderboard.storage import files
 from tests import builders
 from tests.editions import open_edition, publish, roll_back
 
-pytestmark = pytest.mark.slow
-
 HEAD = "anno_id,bag_stamp,cam_id,ts,track_id,ttc"
 Row = list[str]
 ValuesByKey = dict[str, float]  # natural key to seconds

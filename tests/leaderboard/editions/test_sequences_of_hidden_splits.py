@@ -18,7 +18,6 @@ from leaderboard.storage import files, hidden_marks, seeds, truth_values
 from tests import builders
 from tests.editions import corrected, open_edition
 
-pytestmark = pytest.mark.slow
 NOW = timezone.now
 
 

@@ -15,8 +15,6 @@ from leaderboard.models import Edition, Method, Score, Submission, User, Visibil
 from leaderboard.submissions import intake
 from tests import board_rows, builders, pages
 
-pytestmark = pytest.mark.slow
-
 ATOM = "{http://www.w3.org/2005/Atom}"
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -166,6 +164,7 @@ def test_withdrawn_entries_leave_the_feed(edition: Edition, owner: User, client:
 # --- what a link to us shows -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_links_to_boards_and_methods_show_what_they_are(methods: list[Method], client: Client) -> None:
     first, second = methods[:2]
     for address, title in (

@@ -20,8 +20,6 @@ from leaderboard.submissions import intake
 from tests import board_rows, builders, pages
 from tests.services import REQUIRED
 
-pytestmark = pytest.mark.slow
-
 FORMS = ("csv", "json", "tex", "md", "bib")
 HOSTILE = (
     "=HYPERLINK(1)|*b* <script>alert(1)</script>",
@@ -287,6 +285,7 @@ def pdflatex() -> str:
     return program
 
 
+@pytest.mark.slow
 def test_latex_and_bibtex_compile_with_any_name(
     hostile: list[Method], client: Client, tmp_path: Path, pdflatex: str
 ) -> None:

@@ -12,8 +12,6 @@ from leaderboard.people import teams
 from tests import board_rows, builders, pages
 from tests.leaderboard.exports.test_exports import text_of
 
-pytestmark = pytest.mark.slow
-
 SUFFIXES = ("csv", "tex", "md", "bib")
 PAPER = "https://example.org/papers/own"
 
@@ -111,6 +109,7 @@ def test_the_page_offers_every_form_with_and_without_intervals(own: list[Method]
     assert r"\scriptsize" in client.get(sure[2]).text
 
 
+@pytest.mark.slow
 def test_the_page_offers_one_s_own_rows_to_who_has_some(
     own: list[Method], owner: User, stranger: User, client: Client
 ) -> None:

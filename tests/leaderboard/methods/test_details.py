@@ -14,8 +14,6 @@ from leaderboard.methods.details import DETAILS
 from leaderboard.models import AuditEvent, BoardVersion, Edition, Method, Split, Submission, User
 from tests import builders, pages
 
-pytestmark = pytest.mark.slow
-
 ANYBODY = AnonymousUser()
 WHOLE: dict[str, Any] = {
     "description": "What it does.",
@@ -253,6 +251,7 @@ def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
         assert sorted(names(**params)) == sorted(expected), params
 
 
+@pytest.mark.slow
 def test_a_filter_tells_nothing_of_what_an_anonymous_row_hides(
     client: Client, edition: Edition, method: Method, owner: User
 ) -> None:

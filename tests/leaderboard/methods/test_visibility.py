@@ -30,8 +30,6 @@ from leaderboard.submissions import intake
 from leaderboard.upkeep import pollers
 from tests import builders, pages
 
-pytestmark = pytest.mark.slow
-
 ANYBODY = AnonymousUser()
 SECRETS = (
     *("Owls", "owner@example.org", "Secret sauce", "Words of its own"),
@@ -211,6 +209,7 @@ def test_an_anonymous_method_offers_to_be_made_public(
 # --- the page ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_page_shows_what_others_will_see_asks_and_shows_it(
     client: Client, sent: Submission, method: Method, owner: User
 ) -> None:

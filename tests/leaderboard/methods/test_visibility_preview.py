@@ -10,8 +10,6 @@ from leaderboard.models import Edition, Method, User, Visibility
 from tests import builders
 from tests.leaderboard.methods.test_visibility import SECRETS, change
 
-pytestmark = pytest.mark.slow
-
 BOARD = "/api/v1/splits/test/board"
 
 

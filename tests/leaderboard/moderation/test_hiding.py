@@ -34,8 +34,6 @@ from tests import builders
 from tests.leaderboard.web.maintain.desk import get
 from tests.leaderboard.web.test_every_page import assert_sound
 
-pytestmark = pytest.mark.slow
-
 PUBLIC = (
     *("/", "/board/test/", "/board/test.csv", "/board/test.tex", "/board/test.bib", "/board/test/feed.atom"),
     *("/feed.atom", "/api/v1/splits/test/board", "/board/test/?q=rude", "/board/test/charts/", "/compare/"),
@@ -74,6 +72,7 @@ def test_each_action_says_in_its_own_words_that_it_is_done() -> None:
     assert sentences["close-account"] == "The account is closed."
 
 
+@pytest.mark.slow
 def test_renamed_and_masked_names_are_gone_from_board_exports_feed_search_and_the_past(
     keeper: Client, edition: Edition, owner: User, teammate: User
 ) -> None:

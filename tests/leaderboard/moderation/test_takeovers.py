@@ -103,6 +103,7 @@ def take_over(client: Client, user: User) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(5))
 @pytest.mark.parametrize("former", ["owner@example.org", "second@example.org"])
 def test_every_former_address_can_take_the_account_back_by_each_of_its_mails(
@@ -140,6 +141,7 @@ def links_to_first(user: User, former: str, number: int) -> str:
     return takeovers._link(change, former).removeprefix("http://127.0.0.1:8000")
 
 
+@pytest.mark.slow
 def test_a_link_works_once_and_none_of_the_thief_works_after_it(victim: User) -> None:
     client = thief(victim)
     take_over(client, victim)
@@ -150,6 +152,7 @@ def test_a_link_works_once_and_none_of_the_thief_works_after_it(victim: User) ->
     assert addresses_of(victim) == ["owner@example.org", "second@example.org"]
 
 
+@pytest.mark.slow
 def test_the_thief_cannot_be_first_with_a_link_of_their_own(victim: User) -> None:
     client = thief(victim)
     add(client)

@@ -332,6 +332,7 @@ def test_no_alarm_fires_on_a_site_on_which_all_is_well(world: World) -> None:
     assert [alert for alert, rule in RULES.items() if fires(rule, before=figures, now=figures)] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("alert", "spoil"), FAULTS, ids=lambda each: getattr(each, "__name__", each))
 def test_the_alarm_fires_once_its_fault_is_there(
     world: World, alert: str, spoil: Callable[[World], None]

@@ -13,8 +13,6 @@ from leaderboard.ops import broker
 from leaderboard.ops.broker import CircuitBreaker
 from tests import builders
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def listener(monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
@@ -59,6 +57,7 @@ def test_a_broker_that_is_down_is_no_fault(listener: socket.socket) -> None:
     assert not broker.nudge()
 
 
+@pytest.mark.slow
 def test_a_broker_that_hangs_is_given_up_and_then_left_alone_for_a_while(listener: socket.socket) -> None:
     assert not broker.nudge()
     assert n_connected(listener) >= 1

@@ -22,8 +22,6 @@ from leaderboard.ops import backup_runs, faults, health, prometheus
 from leaderboard.upkeep import pollers, store_check
 from tests import builders
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(autouse=True)
 def _no_hurry(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -121,6 +119,7 @@ def test_broker_that_accepts_but_never_answers_is_given_up(
     assert str(silent_port) not in response.text
 
 
+@pytest.mark.slow
 def test_database_that_accepts_but_never_answers_is_given_up(
     silent_port: int, monkeypatch: pytest.MonkeyPatch, db: None
 ) -> None:
@@ -220,6 +219,7 @@ def test_little_room_is_named_and_keeps_the_site_healthy() -> None:
     assert (response.status_code, _is_ok("free space")) == (200, False)
 
 
+@pytest.mark.slow
 @pytest.mark.django_db(transaction=True)
 def test_a_refused_upload_is_named_until_one_is_accepted_or_an_hour_has_passed(
     edition: Edition, owner: User, settings: Settings

@@ -19,8 +19,6 @@ from leaderboard.ops import logs
 from leaderboard.storage import truth_values
 from tests import builders
 
-pytestmark = pytest.mark.slow
-
 Lines = Callable[[], list[dict[str, Any]]]
 
 
@@ -83,6 +81,7 @@ def test_every_line_from_upload_to_score_names_the_submission(
         assert {"level", "logger", "timestamp"} <= set(line)
 
 
+@pytest.mark.slow
 def test_no_secret_no_address_and_no_true_value_is_ever_written(
     opened: Edition, owner: User, written: io.StringIO
 ) -> None:

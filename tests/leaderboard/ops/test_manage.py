@@ -12,9 +12,8 @@ from django.core.management import get_commands
 
 from tests.services import REPOSITORY, environment_of_its_own
 
-pytestmark = pytest.mark.slow
 
-
+@pytest.mark.slow
 def test_a_command_whose_reader_has_left_ends_without_a_traceback() -> None:
     reader, writer = os.pipe()
     os.close(reader)

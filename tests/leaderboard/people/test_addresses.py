@@ -123,6 +123,7 @@ def test_the_database_and_python_agree_on_the_mailbox_of_each_accepted_address()
 # --- the doors ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.django_db
 def test_sign_up_makes_one_account_of_all_spellings(settings: Settings) -> None:
     proving.proving(settings)

@@ -13,8 +13,6 @@ from leaderboard.people import invitations, teams
 from tests import builders, pages
 from tests.leaderboard.people.test_teams import refused
 
-pytestmark = pytest.mark.slow
-
 WEEK = timedelta(days=7)
 
 

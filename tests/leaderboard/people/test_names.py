@@ -9,8 +9,6 @@ from leaderboard.models import Team, User
 from leaderboard.people import teams
 from leaderboard.people.names import MAX_LOOK, MAX_NAME, clean_name, confusable_with, skeleton
 
-pytestmark = pytest.mark.slow
-
 ALIKE = [
     ("PayPal", "PayPaI"),
     ("Owls", "0WLS"),

@@ -21,7 +21,6 @@ from leaderboard.moderation import hiding
 from leaderboard.people import public_names, teams
 from leaderboard.people.names import skeleton
 
-pytestmark = pytest.mark.slow
 NOW = timezone.now
 
 

@@ -19,8 +19,6 @@ from leaderboard.people import tokens
 from tests import builders
 from tests.leaderboard.api.test_submissions import post
 
-pytestmark = pytest.mark.slow
-
 REVOKE = "/api/v1/tokens/revoke"
 ENDED_AT = datetime(2026, 1, 2, 3, 4, tzinfo=UTC)
 
@@ -42,6 +40,7 @@ SCOPES = [("read",), ("submit",), ("publish",), ("read", "submit"), ("read", "su
 TABLE = list(product(SCOPES, ["standing", "expired"], ["standing", "revoked"], ["", "test", "val"]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scopes", "expiry", "revocation", "split"), TABLE)
 def test_a_token_opens_what_it_was_made_for_and_nothing_else(
     edition: Edition, owner: User, scopes: tuple[str, ...], expiry: str, revocation: str, split: str

@@ -18,8 +18,6 @@ from leaderboard.submissions.progress import progress_of
 from tests import builders, pages
 from tests.evaluator.toolkit_folders import driving_folder
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def driven(benchmark: None, tmp_path: Path) -> Edition:
@@ -75,6 +73,7 @@ def test_good_file_has_no_warning(client: Client, truth: evaluator.GroundTruth, 
     assert "Warning." not in client.get(f"/submissions/{submission.pk}/").content.decode()
 
 
+@pytest.mark.slow
 def test_warnings_are_the_same_whatever_the_hidden_values_are(
     truth: evaluator.GroundTruth,
     shuffled: Submission,

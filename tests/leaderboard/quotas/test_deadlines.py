@@ -16,8 +16,6 @@ from leaderboard.upkeep import pollers
 from tests import builders, pages
 from tests.leaderboard.api.test_submissions import client_of, post
 
-pytestmark = pytest.mark.slow
-
 HOUR = timedelta(hours=1)
 LATE, FUTURE, ENDING = "late", "future", "ending"
 

@@ -17,8 +17,6 @@ from leaderboard.upkeep import pollers
 from tests import builders
 from tests.leaderboard.web.account import proving
 
-pytestmark = pytest.mark.slow
-
 DAY = timedelta(days=1)
 PASSWORD = proving.PASSWORD
 
@@ -58,6 +56,7 @@ def left(user: User) -> int | None:
 # --- the attack ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_user_who_sends_deletes_and_signs_up_again_has_no_other_quota(limited: Edition) -> None:
     send(limited, account("x@example.org"), 1.1, 1.2, 1.3)
     for email in ("x@example.org", "X@Example.org", "x+1@example.org"):
@@ -72,6 +71,7 @@ def test_a_user_who_sends_deletes_and_signs_up_again_has_no_other_quota(limited:
     assert SpentMailbox.objects.filter(account=again).count() == 0
 
 
+@pytest.mark.slow
 def test_every_proved_address_of_the_deleted_account_counts_and_others_do_not(limited: Edition) -> None:
     first = account("x@example.org")
     EmailAddress.objects.create(user=first, email="proved+1@example.org", verified=True)
@@ -134,6 +134,7 @@ def test_where_addresses_are_not_proved_nothing_is_kept_and_nothing_counts(
     assert left(account("x@example.org")) == 3
 
 
+@pytest.mark.slow
 def test_a_new_secret_key_separates_a_mailbox_from_what_it_had_sent(
     limited: Edition, settings: Settings
 ) -> None:

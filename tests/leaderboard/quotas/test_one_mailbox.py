@@ -22,8 +22,6 @@ from tests import builders
 from tests.leaderboard.quotas.test_mailboxes import account, forget, left, send
 from tests.leaderboard.web.account import proving
 
-pytestmark = pytest.mark.slow
-
 DAY = timedelta(days=1)
 
 
@@ -56,6 +54,7 @@ def change_address(client: Client, *, old: str, new: str) -> None:
 # --- the two attacks ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_ten_spellings_of_one_mailbox_send_one_file_a_day(shipped: Edition) -> None:
     n_sent = 0
     spellings = ["probe@example.org", *(f'"{"probe"[:i]}\\{"probe"[i:]}"@example.org' for i in range(5))]
@@ -78,6 +77,7 @@ def test_ten_spellings_of_one_mailbox_send_one_file_a_day(shipped: Edition) -> N
     assert User.objects.filter(email__contains='"').count() == 0
 
 
+@pytest.mark.slow
 def test_changing_the_address_frees_neither_the_old_one_nor_the_new_one(shipped: Edition) -> None:
     n_sent = 0
     for i in range(5):
@@ -95,6 +95,7 @@ def test_changing_the_address_frees_neither_the_old_one_nor_the_new_one(shipped:
     assert left(account("second+x@example.org")) == 2
 
 
+@pytest.mark.slow
 def test_every_proved_address_counts_not_the_primary_one_alone(shipped: Edition) -> None:
     first, second, third = (account(f"{name}@example.org") for name in ("a", "b+1", "c"))
     EmailAddress.objects.create(user=first, email="b@example.org", verified=True)
@@ -113,6 +114,7 @@ def test_every_proved_address_counts_not_the_primary_one_alone(shipped: Edition)
 # --- until when, and for whom -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_given_up_address_counts_until_the_window_ends_and_then_is_the_next_owners_alone(
     shipped: Edition,
 ) -> None:
@@ -141,6 +143,7 @@ def test_a_given_up_address_counts_until_the_window_ends_and_then_is_the_next_ow
     assert not SpentMailbox.objects.exists()
 
 
+@pytest.mark.slow
 def test_an_address_that_is_proved_after_the_files_goes_on_counting_when_it_is_removed(
     shipped: Edition,
 ) -> None:
@@ -152,6 +155,7 @@ def test_an_address_that_is_proved_after_the_files_goes_on_counting_when_it_is_r
     assert left(account("second@example.org")) == 2
 
 
+@pytest.mark.slow
 def test_hashes_are_prolonged_with_each_file_and_deletion_finds_them_there(shipped: Edition) -> None:
     user = account("first@example.org")
     send(shipped, user, 1.1)
@@ -177,6 +181,7 @@ def test_all_accounts_that_count_together_are_locked_together(shipped: Edition) 
 # --- accounts from before addresses had one spelling --------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.django_db(transaction=True)
 def test_the_migration_gives_each_address_one_spelling_and_twins_share_a_mailbox(settings: Settings) -> None:
     proving.proving(settings)

@@ -12,8 +12,6 @@ from leaderboard.quotas import usage
 from leaderboard.quotas.usage import Quota, QuotaExceeded
 from tests import builders
 
-pytestmark = pytest.mark.slow
-
 DAY = timedelta(days=1)
 
 
@@ -116,6 +114,7 @@ def test_an_address_is_folded_to_its_mailbox(db: None) -> None:
     assert dict(User.objects.values_list("email", "mailbox")) == folded
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("proved")
 def test_accounts_of_one_mailbox_spend_one_quota_whatever_teams_they_are_in(
     limited: Edition, owner: User, stranger: User

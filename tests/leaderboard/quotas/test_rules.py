@@ -13,8 +13,6 @@ from leaderboard.models import AuditEvent, Split, User
 from leaderboard.people import teams
 from tests import builders
 
-pytestmark = pytest.mark.slow
-
 NONE, DAY = timedelta(0), timedelta(days=1)
 LONG = timedelta(days=99_999_999)
 WINDOW = "expected whole seconds, more than 0 and at most 3,650 days."

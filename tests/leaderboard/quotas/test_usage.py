@@ -28,8 +28,6 @@ from leaderboard.quotas.usage import Quota, QuotaExceeded
 from leaderboard.submissions import intake
 from tests import builders
 
-pytestmark = pytest.mark.slow
-
 DAY = timedelta(days=1)
 HOUR = timedelta(hours=1)
 NOW = datetime(2026, 11, 20, 12, 0, tzinfo=UTC)
@@ -163,6 +161,7 @@ def test_an_edition_that_is_given_up_costs_its_submissions_nothing(edition: Edit
     assert (state(owner).used, state(owner).n_rejected) == (1, 0)
 
 
+@pytest.mark.slow
 def test_scoring_again_costs_nothing_and_gives_nothing_back(
     edition: Edition, owner: User, tmp_path: Path
 ) -> None:
@@ -245,6 +244,7 @@ rules = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(rules=rules, spent=st.lists(minutes, max_size=8), rejected=st.lists(minutes, max_size=8), now=minutes)
 def test_the_next_slot_opens_exactly_when_the_quota_says(
     rules: QuotaOverride, spent: list[datetime], rejected: list[datetime], now: datetime

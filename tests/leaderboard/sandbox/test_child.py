@@ -37,8 +37,6 @@ from tests.leaderboard.sandbox.child_processes import (
     needs_root,
 )
 
-pytestmark = pytest.mark.slow
-
 MAX_BEATS = 5000
 FAULTY = b'{"0": "x", "nope": 1}'
 Read = Callable[..., Predictions]
@@ -107,6 +105,7 @@ def read_slowly(read: Read, data: bytes, action: Callable[[int], object]) -> Pre
         return read(source, heartbeat=heartbeat, heartbeat_s=0.02)
 
 
+@pytest.mark.slow
 def test_good_file_comes_back_as_the_same_values(read: Read, manifest: Manifest, truth_path: Path) -> None:
     ttc_s = read_truth(truth_path).ttc_s * 1.25
     data = write_predictions(manifest=manifest, ttc_s=ttc_s)
@@ -129,6 +128,7 @@ def test_faulty_file_is_rejected_with_the_words_of_the_evaluator(read: Read, man
     assert there.value.as_dict() == here.value.as_dict()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "data",
     [

@@ -34,8 +34,6 @@ from tests.leaderboard.sandbox.hostile_reader import (
     write_site,
 )
 
-pytestmark = pytest.mark.slow
-
 Read = Callable[[bytes], Predictions]
 needs_a_filter = pytest.mark.skipif(
     system_calls.why_unavailable() is not None,
@@ -214,6 +212,7 @@ LIES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lie", LIES)
 def test_a_lie_is_refused_in_words(read: Read, settings: Settings, tmp_path: Path, lie: str) -> None:
     data, words = LIES[lie]
@@ -221,6 +220,7 @@ def test_a_lie_is_refused_in_words(read: Read, settings: Settings, tmp_path: Pat
         read(data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("descriptor", [1, 2])
 def test_a_reader_that_writes_without_end_costs_the_worker_no_memory(
     read: Read, settings: Settings, tmp_path: Path, descriptor: int
@@ -235,6 +235,7 @@ def test_a_reader_that_writes_without_end_costs_the_worker_no_memory(
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb < 30_000
 
 
+@pytest.mark.slow
 def test_values_of_another_file_are_not_replaced(
     edition: Edition, owner: User, settings: Settings, tmp_path: Path
 ) -> None:
@@ -272,6 +273,7 @@ def read_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[by
     return read_one
 
 
+@pytest.mark.slow
 @needs_a_filter
 def test_reader_of_annotations_that_is_taken_over_reaches_nothing(
     read_folder: Callable[[bytes], Manifest], targets: dict[str, str | int]
@@ -287,6 +289,7 @@ def test_reader_of_annotations_that_is_taken_over_reaches_nothing(
     assert set(table.values()) == {"EPERM"}, table
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "answer",
     [
@@ -307,6 +310,7 @@ def test_a_lie_about_annotations_is_refused_in_words(
         read_folder(says(answer))
 
 
+@pytest.mark.slow
 def test_reader_that_complains_without_end_is_ended(
     read_folder: Callable[[bytes], Manifest], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -17,8 +17,6 @@ from leaderboard.web.charts import analysis_charts
 from tests import builders
 from tests.editions import ANYBODY
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def val(benchmark: None, tmp_path: Path) -> Edition:
@@ -157,6 +155,7 @@ def test_hidden_values_are_looked_at_by_no_worker_whatever_the_database_calls_th
     assert not Analysis.objects.exists()
 
 
+@pytest.mark.slow
 def test_a_file_that_cannot_be_read_keeps_no_other_analysis_waiting(
     val: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -19,7 +19,7 @@ from leaderboard.upkeep import backlog
 from tests import builders
 from tests.leaderboard.web.maintain import queue_rows
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("open_values")]
+pytestmark = [pytest.mark.usefixtures("open_values")]
 Pairs = list[tuple[Any, Any]]
 ANYBODY = AnonymousUser()
 
@@ -106,6 +106,7 @@ def test_what_failed_is_tried_again_in_turn_behind_all_else(edition: Edition, pa
     assert [upcoming() for _ in range(4)] == [pairs[9], pairs[1], pairs[2], pairs[0]]
 
 
+@pytest.mark.slow
 def test_fifty_pairs_that_fail_leave_a_turn_to_the_others(
     edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -145,6 +146,7 @@ def test_one_reader_has_a_number_of_new_ones_computed_and_others_theirs(
     assert [ask(edition, pair, user=owner, address=pair[0]) for pair in pairs[4:8]] == [True] * 3 + [False]
 
 
+@pytest.mark.slow
 def test_asking_again_counts_nothing(
     entries: list[Submission], edition: Edition, client: Client, settings: Settings
 ) -> None:

@@ -17,7 +17,7 @@ from leaderboard.submissions import intake
 from tests import builders
 from tests.editions import ANYBODY
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("open_values")]
+pytestmark = [pytest.mark.usefixtures("open_values")]
 
 
 def ask(
@@ -41,6 +41,7 @@ def set_visibility(submission: Submission, visibility: Visibility) -> None:
     Method.objects.filter(pk=submission.method_id).update(visibility=visibility, shown_at=shown_at)
 
 
+@pytest.mark.slow
 def test_a_comparison_is_asked_for_once_and_answered_by_a_worker(
     entries: list[Submission], edition: Edition
 ) -> None:
@@ -71,6 +72,7 @@ def test_a_comparison_is_asked_for_once_and_answered_by_a_worker(
         assert pair.sentence("mid_small").startswith(f"The MiD on small of {pair.first.method} is ")
 
 
+@pytest.mark.slow
 def test_the_worker_computes_what_the_evaluator_says_offline(
     entries: list[Submission], edition: Edition
 ) -> None:
@@ -102,6 +104,7 @@ def test_the_same_pair_the_other_way_round_is_the_same_comparison(entries: list[
         )
 
 
+@pytest.mark.slow
 def test_a_method_is_compared_as_it_stands_now(
     entries: list[Submission], edition: Edition, owner: User
 ) -> None:
@@ -162,6 +165,7 @@ def test_what_makes_no_comparison_is_refused_in_words(entries: list[Submission],
     assert codes == {"bad-comparison", "unknown-method", "not-on-the-board"}
 
 
+@pytest.mark.slow
 def test_too_few_recordings_give_differences_without_p(benchmark: None, owner: User, tmp_path: Path) -> None:
     edition = builders.import_truth(tmp_path, n_recordings=7)
     sent = [
@@ -178,6 +182,7 @@ def test_too_few_recordings_give_differences_without_p(benchmark: None, owner: U
     assert answer.pairs[0].sentence().endswith("at least 8 needed) to say whether that is significant.")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.05, 1.05 + 1e-7], ids=["the same file", "a file published alike"])
 def test_values_published_alike_are_not_significantly_different(
     entries: list[Submission], edition: Edition, stranger: User, factor: float

@@ -35,8 +35,6 @@ from tests import builders
 from tests.editions import ANYBODY, board_now, corrected, open_edition
 from tests.leaderboard.statistics.inferred_scores import INFERRED, everything, scores_of
 
-pytestmark = pytest.mark.slow
-
 
 def hide(submission: Submission) -> None:
     Method.objects.filter(pk=submission.method_id).update(visibility=Visibility.PRIVATE)

@@ -8,8 +8,6 @@ from leaderboard.statistics import confidence, recording_sums
 from tests import builders
 from tests.leaderboard.statistics.inferred_scores import everything
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def inferred(entries: list[Submission]) -> list[Submission]:
@@ -28,6 +26,7 @@ def test_an_edition_knows_its_effective_numbers_of_recordings(
         assert 0 <= exact - edition.n_effective[name] < 0.1
 
 
+@pytest.mark.slow
 def test_every_random_number_of_an_edition_comes_from_its_seed(
     inferred: list[Submission], edition: Edition, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -34,8 +34,6 @@ from tests import builders
 from tests.editions import ANYBODY
 from tests.leaderboard.statistics.test_comparisons import ask, known, set_visibility
 
-pytestmark = pytest.mark.slow
-
 Rival = Callable[[float], Submission]
 
 
@@ -231,6 +229,7 @@ def test_what_is_not_public_is_not_compared_on_a_hidden_split_by_its_own_team_ei
     assert "M1.05 is not public" in pair.withheld
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_hidden", [True, False])
 def test_an_anonymous_method_of_another_team_is_compared_once_it_is_public(
     entries: list[Submission], owner: User, stranger: User, rival: Rival, is_hidden: bool
@@ -257,6 +256,7 @@ def test_an_anonymous_method_of_another_team_is_compared_once_it_is_public(
 # --- whatever the database says --------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_calling_a_hidden_split_open_in_the_database_tells_no_more_of_it(
     entries: list[Submission], edition: Edition, owner: User, rival: Rival, client: Client
 ) -> None:

@@ -31,8 +31,6 @@ from tests import builders
 from tests.prepared import REPOSITORY, put_sqlite
 from tests.services import environment_of_its_own
 
-pytestmark = pytest.mark.slow
-
 BUCKET = "tsttc-test"
 
 
@@ -95,6 +93,7 @@ def _send(user: User, data: bytes) -> Any:
 # --- the journey ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_submission_is_scored_and_the_manifest_served_without_any_local_file(
     stored: s3.S3FileStore, bucket: Any, settings: Settings, benchmark: None, owner: User, tmp_path: Path
 ) -> None:
@@ -234,6 +233,7 @@ def test_key_in_the_url_is_refused_and_not_repeated() -> None:
 # --- cleaning up ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_orphan_in_the_bucket_is_listed_and_removed(stored: s3.S3FileStore, bucket: Any, db: None) -> None:
     kept = files.save_predictions(ContentFile(b'{"0": 1.5}', name="p.json"), now=timezone.now())
     assert list(orphans.orphans(now=timezone.now())) == []
@@ -268,6 +268,7 @@ call_command("restore", folder)
 """
 
 
+@pytest.mark.slow
 def test_an_sqlite_database_and_the_files_of_a_bucket_come_back_once(
     bucket: Any, server: str, tmp_path: Path
 ) -> None:

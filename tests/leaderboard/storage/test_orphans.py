@@ -19,8 +19,6 @@ from leaderboard.storage import files, orphans
 from leaderboard.upkeep import pollers
 from tests import builders
 
-pytestmark = pytest.mark.slow
-
 
 def clean() -> int:
     """Remove all that is to be removed now; how many files that were."""

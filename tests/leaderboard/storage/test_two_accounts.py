@@ -23,7 +23,6 @@ from tests import builders
 from tests.services import REPOSITORY
 
 pytestmark = [
-    pytest.mark.slow,
     pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="only root has other accounts"),
 ]
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
@@ -126,6 +125,7 @@ def test_what_the_web_process_is_sent_is_scored_by_a_worker_and_what_workers_wri
     assert modes == {0o640, 0o2770}
 
 
+@pytest.mark.slow
 def test_the_web_account_opens_nothing_that_is_the_workers(host: Host) -> None:
     as_account("tsttc", lambda: truth_values.save(host.truth, is_hidden=True))
     begun, ended, number = FORK.Event(), FORK.Event(), FORK.Value("i")

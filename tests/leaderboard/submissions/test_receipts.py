@@ -19,8 +19,6 @@ from tests import builders, pages
 from tests.editions import corrected, open_edition, publish
 from tests.leaderboard.api.test_submissions import client_of
 
-pytestmark = pytest.mark.slow
-
 KEYS = "/.well-known/tsttc-receipt-keys.json"
 
 

@@ -14,8 +14,6 @@ from leaderboard.statistics import analyses, confidence
 from leaderboard.storage import seeds
 from tests import builders
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def scored(edition: Edition, owner: User) -> Edition:

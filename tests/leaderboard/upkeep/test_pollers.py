@@ -22,8 +22,6 @@ from leaderboard.upkeep.pollers import Poller
 from tests import builders
 from tests.leaderboard.web.maintain import queue_rows
 
-pytestmark = pytest.mark.slow
-
 TIMEOUT_S = 180
 
 
@@ -101,6 +99,7 @@ def test_a_sweep_that_breaks_is_not_written_down_and_keeps_nothing_else_waiting(
     assert SweepBeat.objects.exclude(cleaned_at=None).exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "times",
     [
@@ -121,6 +120,7 @@ def test_times_that_could_not_tell_a_dead_worker_from_a_long_run_are_refused(tim
     assert "expected each to be shorter than the next" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_worker_that_lacks_a_library_does_not_start() -> None:
     start = "import sys; sys.modules['numpy'] = None; import leaderboard.celery as worker; "
     done = subprocess.run(
@@ -134,6 +134,7 @@ def test_a_worker_that_lacks_a_library_does_not_start() -> None:
     assert "import of numpy halted" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_worker_keeps_its_memory_private() -> None:
     """Celery says `worker_init` before it forks the processes that run tasks, which inherit it."""
     start = "import ctypes, leaderboard.celery; from celery.signals import worker_init; "
@@ -151,6 +152,7 @@ def test_a_worker_keeps_its_memory_private() -> None:
     assert done.stdout == "0\n"
 
 
+@pytest.mark.slow
 def test_a_look_decides_everything_that_waits(edition: Edition, owner: User) -> None:
     for factor in (1.1, 1.2, 1.3):
         builders.submit(owner, builders.predictions(edition, factor=factor))

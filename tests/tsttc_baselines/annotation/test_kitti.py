@@ -12,6 +12,7 @@ from tsttc_baselines.annotation.pipeline import Depth, annotate
 LINE = "{frame} 7 Car {truncated} 0 0.1 100 100 140 130 1.5 1.8 4.0 {x} 1.0 {z} {rotation}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("depth", "least"), [("measured", 1.0), ("checked", 0.99)])
 def test_the_ground_truth_of_kitti_dev_is_reproduced(
     kitti: Path, kitti_labels: Path, depth: Depth, least: float

@@ -8,8 +8,6 @@ import pytest
 
 from tests.evaluator.worlds import Tsttc
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def frames(tsttc: Tsttc, tmp_path: Path) -> Path:

@@ -17,6 +17,7 @@ def content(folder: Path) -> dict[str, bytes]:
     return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
+@pytest.mark.slow
 def test_a_rendered_folder_is_run_checked_and_scored(tsttc: Tsttc, tmp_path: Path) -> None:
     folder, out = tmp_path / "frames", tmp_path / "p.json"
     result = tsttc("baseline", "render", folder, *SPLIT, "--jobs", "1")

@@ -13,8 +13,6 @@ from tsttc_baselines.deep_scale.network import Operations
 from tsttc_baselines.deep_scale.weights import read_weights
 from tsttc_baselines.methods import OWN_WEIGHTS
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def operations() -> Operations:
@@ -39,6 +37,7 @@ def test_small_boxes_are_enlarged_and_their_scale_ratio_is_recovered() -> None:
     assert Grid.over(clip.boxes[5], box_px=80.0).pixel_size == pytest.approx(0.5)
 
 
+@pytest.mark.slow
 def test_the_card_of_weights_says_how_they_are_decoded() -> None:
     assert read_weights(OWN_WEIGHTS).use.decoding == "fit"
     clip = planted(0.9)

@@ -19,8 +19,6 @@ from tsttc_baselines.deep_scale.network import Array, Sampling, features, simila
 from tsttc_baselines.deep_scale.roi_align import sampling_matrix
 from tsttc_baselines.deep_scale.weights import read_weights
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def shared() -> Path:
@@ -91,6 +89,7 @@ def deep_scale(shared: Path) -> DeepScale:
     return DeepScale(weights=shared / "deep-scale" / "Deep_TTC.pth")
 
 
+@pytest.mark.slow
 def test_real_frames_reach_their_errors(
     deep_scale: DeepScale, real_clips: tuple[list[Clip], Array], golden: Any
 ) -> None:
@@ -113,6 +112,7 @@ def painted_over(path: Path) -> Image:
     return np.asarray(cv2.inpaint(image, drawn, 3, cv2.INPAINT_TELEA), dtype=np.uint8)
 
 
+@pytest.mark.slow
 def test_the_real_sequence_of_the_dataset_has_the_printed_time(deep_scale: DeepScale, shared: Path) -> None:
     source = shared / "tsttc-sequence"
     if not source.is_dir():

@@ -50,6 +50,7 @@ def test_guesses_from_many_addresses_meet_the_limit_of_the_account(owner: User) 
     assert sign_in(owner, OLD_PASSWORD, address=HOME)
 
 
+@pytest.mark.slow
 def test_a_reset_password_opens_the_account_from_everywhere(owner: User) -> None:
     for n in range(30):
         sign_in(owner, "wrong", address=f"203.0.113.{n}")

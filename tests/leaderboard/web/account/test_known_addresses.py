@@ -72,6 +72,7 @@ def test_every_way_answers_the_same_for_a_free_and_a_taken_address(way: str) -> 
     assert answers(TAKEN, *WAYS[way]) == answers(FREE, *WAYS[way])
 
 
+@pytest.mark.slow
 def test_signing_in_after_signing_up_answers_as_a_wrong_password_does() -> None:
     for email in (TAKEN, FREE):
         sign_up(Client(), email, password=EVIL)
@@ -110,6 +111,7 @@ def test_adding_a_free_and_a_taken_address_answers_the_same() -> None:
     assert seen[0] == seen[1]
 
 
+@pytest.mark.slow
 def test_a_right_password_may_be_sent_only_so_often(owner: User) -> None:
     EmailAddress.objects.create(user=owner, email=owner.email, primary=True, verified=True)
     fields = {"login": owner.email, "password": "correct horse"}

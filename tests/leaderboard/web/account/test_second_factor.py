@@ -131,6 +131,7 @@ def tries(user: User, code: str, *, address: str) -> bool:
     return client.post("/accounts/2fa/authenticate/", {"code": code}).status_code == 302
 
 
+@pytest.mark.slow
 def test_wrong_codes_from_one_address_lock_out_that_address_and_not_the_owner(
     owner: User, phone: Phone
 ) -> None:
@@ -201,6 +202,7 @@ def mailed_code() -> str:
     return str(code)
 
 
+@pytest.mark.slow
 def test_maintainers_who_must_have_one_are_led_to_it_and_see_nothing_more_before(
     keeper: User, owner: User, edition: Edition, phone: Phone, settings: Settings
 ) -> None:

@@ -50,6 +50,7 @@ def subjects() -> list[str]:
     return [message.subject.partition("] ")[2] for message in mail.outbox]
 
 
+@pytest.mark.slow
 def test_with_a_mail_server_addresses_are_proved_by_a_code(production: dict[str, str]) -> None:
     code = (
         "from leaderboard import settings as s;"

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 
+import pytest
 from django.test import Client
 from django.urls import reverse
 
@@ -49,6 +50,7 @@ def openapi_operations() -> list[dict[str, str]]:
     return [operation for methods in schema["paths"].values() for operation in methods.values()]
 
 
+@pytest.mark.slow
 def test_every_operation_of_the_schema_is_described(client: Client, benchmark: None) -> None:
     schema = client.get(reverse("api-schema"), headers={"accept": "application/vnd.oai.openapi+json"}).json()
     table = get(client).one("table", class_="operations")

@@ -147,6 +147,7 @@ def test_the_template_has_every_natural_key_and_is_rejected_until_it_is_filled_i
     assert client.get("/submit/template/val.json").status_code == 404
 
 
+@pytest.mark.slow
 def test_details_of_the_method_are_taken_with_the_file_in_words_of_people(
     signed_in: Client, edition: Edition
 ) -> None:
@@ -249,6 +250,7 @@ def constant(edition: Edition, value: float) -> bytes:
     return json.dumps({str(row): value for row in manifest.anno_id.tolist()}).encode()
 
 
+@pytest.mark.slow
 def test_a_file_with_a_warning_is_submitted_once_that_is_confirmed(
     signed_in: Client, edition: Edition, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -271,6 +273,7 @@ def test_a_file_that_cannot_be_read_is_left_to_the_worker(
     assert send(signed_in, b"[").status_code == 302
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("visibility", ["PUBLIC", "ANONYMOUS"])
 def test_a_file_of_a_method_that_others_see_is_asked_about(
     signed_in: Client, edition: Edition, owner: User, visibility: str
@@ -283,6 +286,7 @@ def test_a_file_of_a_method_that_others_see_is_asked_about(
     assert send(signed_in, data, method="Mine", confirmed=answer).status_code == 302
 
 
+@pytest.mark.slow
 def test_a_name_like_another_one_and_bytes_of_another_method_are_asked_about(
     signed_in: Client, edition: Edition, owner: User, stranger: User
 ) -> None:
