@@ -54,8 +54,9 @@ def test_preview_says_what_becomes_rejected_and_why(entries: list[Submission], t
 
 
 def test_what_is_rejected_in_both_editions_is_not_changed(
-    entries: list[Submission], owner: User, open_values: None
+    entries: list[Submission], edition: Edition, owner: User
 ) -> None:
+    builders.open_values(edition)
     builders.submit(owner, b'{"0": 3.5}', method="Incomplete")
     builders.score_all()
     second = open_edition(protocol="tsttc-2")
