@@ -4,7 +4,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.chromium import timers_at_rest
-from tests.browser.conftest import NewPage, sign_up
+from tests.browser.conftest import PASSWORD, NewPage, sign_up
 
 pytestmark = pytest.mark.browser
 
@@ -42,4 +42,7 @@ def test_link_lets_a_second_person_in(new_page: NewPage) -> None:
     expect(guest.get_by_text("Make owner")).to_have_count(0)
     handing_over.get_by_role("checkbox").check()
     make_owner.click()
+    # An open session is not enough.
+    owner.get_by_role("textbox", name="Password").fill(PASSWORD)
+    owner.get_by_role("button", name="Continue").click()
     expect(owner.get_by_text("second-of-two@example.org owns the team now.")).to_be_visible()
