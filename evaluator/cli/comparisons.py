@@ -23,7 +23,7 @@ from evaluator.cli.options import (
     unit_option,
     url_option,
 )
-from evaluator.cli.reading import TABLE, labels_of, naming, predictions_of, units_asked
+from evaluator.cli.reading import TABLE, labels_of, naming, naming_predictions, predictions_of, units_asked
 from evaluator.cli.tokens import has_token
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PROTOCOLS, primary_of
 from evaluator.scoring.significance import Difference
@@ -155,7 +155,7 @@ def _compare_files(
     taken = units_asked(truth, unit)
     read, reports = [], []
     for path in (first, second):
-        with naming(path):
+        with naming_predictions(path):
             predictions = read_predictions(predictions_of(path), manifest=truth.manifest)
             read.append(predictions)
             reports.append(evaluate(predictions, truth, protocol=protocol))

@@ -14,7 +14,15 @@ from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import echo_json
 from evaluator.cli.options import json_option, output_option, predictions_argument, site_options, slug
-from evaluator.cli.reading import FOLDER, TABLE, name_of, naming, predictions_of, write_bytes
+from evaluator.cli.reading import (
+    FOLDER,
+    TABLE,
+    name_of,
+    naming,
+    naming_predictions,
+    predictions_of,
+    write_bytes,
+)
 from evaluator.cli.warnings_in_words import (
     echo_warnings,
     numbering_in_words,
@@ -68,7 +76,7 @@ def check(
     from evaluator.predictions.plausibility import warnings_of  # noqa: PLC0415 -- as above
 
     sequences, numbering = _sequences(manifest_path, annotations)
-    with naming(predictions):
+    with naming_predictions(predictions):
         parsed = read_predictions(predictions_of(predictions), manifest=sequences, max_bytes=MAX_FILE_BYTES)
     warnings = warnings_of(parsed)
     if numbering is not None and annotations is not None:

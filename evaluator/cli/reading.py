@@ -35,6 +35,15 @@ def naming(path: Path) -> Iterator[None]:
     try:
         yield
     except Rejected as fault:
+        raise rejected(name_of(path), fault) from None
+
+
+@contextmanager
+def naming_predictions(path: Path) -> Iterator[None]:
+    """Do the same for predictions read with a manifest; if only keys are wrong, say which one may fit."""
+    try:
+        yield
+    except Rejected as fault:
         codes = {problem.code for problem in fault.problems}
         has_other_keys = "unknown-keys" in codes and codes <= {"unknown-keys", "missing-keys"}
         raise rejected(name_of(path), fault, hint=OTHER_MANIFEST if has_other_keys else "") from None

@@ -18,6 +18,7 @@ from evaluator.cli.reading import (
     TABLE,
     labels_of,
     naming,
+    naming_predictions,
     predictions_of,
     units_asked,
     write_bytes,
@@ -247,7 +248,7 @@ def _scored(paths: Sequence[Path], truth: GroundTruth, *, protocol: ProtocolName
     if len(set(paths)) < len(paths):
         raise click.UsageError("A file is named twice; expected each once.")
     for path, label in zip(paths, labels_of(paths), strict=True):
-        with naming(path):
+        with naming_predictions(path):
             read = read_predictions(predictions_of(path), manifest=truth.manifest)
             report = evaluate(read, truth, protocol=protocol, keep_sequences=True)
         yield _Scored(label, report, warnings_with_truth(read, truth))

@@ -231,6 +231,10 @@ def test_keys_of_another_manifest_lead_to_that_manifest_and_other_faults_do_not(
             result = tsttc(arguments[0], path, *arguments[1:])
             assert result.exit_code == 1
             assert ("tsttc manifest --split SPLIT --edition N -o other.csv" in result.stderr) is is_named
+    compared = tsttc("compare", other, GOOD, "--truth", TRUTH)
+    converted = tsttc("convert", GOOD, "--manifest", MANIFEST)
+    assert "--edition N" in compared.stderr
+    assert (converted.exit_code, "--edition N" in converted.stderr) == (1, False), "its keys need nothing"
 
 
 def test_a_good_file_with_anno_ids_is_told_that_they_count_in_one_edition(
