@@ -77,6 +77,8 @@ class _Finder:
     def of_module(self, module: ast.Module) -> Iterator[Fault]:
         for statement in module.body:
             match statement:
+                case ast.Assign(value=ast.Subscript()):
+                    pass  # the name of a type
                 case ast.Assign(targets=[ast.Name(id=name)], value=value):
                     yield from self.of_constant(name, value)
                 case ast.AnnAssign(target=ast.Name(id=name), value=ast.expr() as value):
@@ -139,7 +141,7 @@ class _Finder:
                     yield node, str(not truth)
                 case ast.Constant(value=int() | float() as number):
                     yield node, str(number + 1)
-                    yield node, str(number - 1 if isinstance(number, int) else number * 1.01)
+                    yield node, str(number * 1.01 if isinstance(number, float) and number else number - 1)
                 case ast.Name(id=name) if name in _NAMES:
                     yield node, _NAMES[name]
                 case ast.Attribute(value=value, attr=name) if name in _NAMES:

@@ -375,3 +375,55 @@ def test_an_unproved_address_undoes_nothing(owner: User) -> None:
     EmailAddress.objects.create(user=owner, email=owner.email, verified=False, primary=True)
     assert takeovers.proved(owner) == []
     assert addresses.are_proved()
+
+
+def test_a_link_that_was_used_or_whose_change_is_gone_says_so_and_does_nothing(victim: User) -> None:
+    now = timezone.now()
+    links = takeovers.note(
+        user=victim, what="email_changed", before=[victim.email, "old@example.org"], now=now
+    )
+    assert links.keys() == {victim.email, "old@example.org"}
+    secret = links["old@example.org"].rstrip("/").rpartition("/")[2]
+    takeovers.undo(secret=secret, since=None, now=now)
+    assert addresses_of(victim)[0] == "owner@example.org"
+    for _ in range(2):
+        with pytest.raises(takeovers.UnusableLink, match="was used already"):
+            takeovers.find(secret=secret, now=now)
+        AccountChange.objects.all().delete()
+
+
+def test_a_change_of_another_person_is_kept_and_undone_by_their_own_link_alone(
+    victim: User, stranger: User
+) -> None:
+    now = timezone.now()
+    secrets = {}
+    for user in (victim, stranger):
+        former = f"former-{user.name}@example.org"
+        links = takeovers.note(user=user, what="email_changed", before=[former], now=now)
+        assert links.keys() == {former}
+        secrets[user] = links[former].rstrip("/").rpartition("/")[2]
+    assert takeovers.undo(secret=secrets[victim], since=None, now=now) == victim
+    assert addresses_of(victim) == ["former-Owls@example.org"]
+    assert AccountChange.objects.get(user=stranger).undone_at is None
+    assert takeovers.find(secret=secrets[stranger], now=now).user == stranger
+
+
+@pytest.mark.parametrize(("age", "works"), [(7 * DAY - timedelta(seconds=1), True), (7 * DAY, False)])
+def test_a_change_can_be_undone_for_less_than_a_week(victim: User, age: timedelta, works: bool) -> None:
+    now = timezone.now()
+    links = takeovers.note(user=victim, what="email_changed", before=["old@example.org"], now=now)
+    secret = links["old@example.org"].rstrip("/").rpartition("/")[2]
+    if works:
+        assert takeovers.find(secret=secret, now=now + age).address == "old@example.org"
+    else:
+        with pytest.raises(takeovers.UnusableLink, match="older than a week"):
+            takeovers.find(secret=secret, now=now + age)
+
+
+def test_a_former_address_finds_the_accounts_that_had_it(victim: User, stranger: User) -> None:
+    for user, before in ((victim, ["a@old.example", "b@old.example"]), (stranger, ["c@other.example"])):
+        takeovers.note(user=user, what="email_changed", before=before, now=timezone.now())
+    assert takeovers.with_former_address(" B@OLD ") == {victim.pk}
+    assert takeovers.with_former_address("other.example") == {stranger.pk}
+    assert takeovers.with_former_address("example") == {victim.pk, stranger.pk}
+    assert takeovers.with_former_address(" ") == set()
