@@ -8,6 +8,7 @@ from typing import Any, Final
 import pandas as pd
 
 from evaluator.arguments import require
+from evaluator.arrays import as_floats
 from evaluator.predictions import slips
 from evaluator.predictions.headers import NAMES, NATURAL_KEY, RATES
 from evaluator.predictions.loading import Predictions, read_predictions
@@ -38,7 +39,7 @@ def predictions_from_frame(
     Values are seconds in `column`, by default `ttc_s`, else `ttc`; or scale ratios in `scale_ratio`, with a
     column `fps` or `frame_gap`. Keys are the columns `bag_stamp`, `cam_id`, `ts` and `track_id`, else
     `anno_id` (a column or the index). Raises `Rejected` as for a file, `ValueError` for a frame without keys
-    or rates, `KeyError` for a missing column.
+    or rates, `KeyError` for a missing column, `TypeError` for one of texts or other things than real numbers.
     """
     require(frame, pd.DataFrame, name="frame")
     names = list(map(str, frame.columns))
@@ -56,12 +57,26 @@ def predictions_from_frame(
     keys = [json.dumps(str(key)) for key in _keys(frame)]
     predictions, *rest = (
         "{" + ",".join(f"{key}:{json.dumps(value)}" for key, value in zip(keys, each, strict=True)) + "}"
-        for each in (frame[name].astype("float64") for name in (column, *rates))
+        for each in (_numbers(frame[name], name=name) for name in (column, *rates))
     )
     if not rates:
         return read_predictions(predictions.encode(), manifest=manifest)
     document = f'{{"unit":"{RATIO}","{rates[0]}":{rest[0]},"predictions":{predictions}}}'
     return read_predictions(document.encode(), manifest=manifest)
+
+
+def _numbers(values: pd.Series[Any], *, name: str) -> Any:
+    """Convert a column (n,) to float64, NaN where it has no value."""
+    kinds = pd.api.types
+    is_real = kinds.is_numeric_dtype(values) and not (
+        kinds.is_bool_dtype(values) or kinds.is_complex_dtype(values)
+    )
+    if is_real:
+        return values.astype("float64")
+    try:
+        return as_floats(list(values)).tolist()
+    except (TypeError, ValueError) as fault:
+        raise TypeError(f"In the column {name!r}: {fault}") from None
 
 
 def _value_column(names: list[str]) -> str:

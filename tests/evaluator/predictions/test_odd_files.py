@@ -305,3 +305,30 @@ def test_check_and_convert_refuse_in_the_same_words(tsttc: Tsttc, tmp_path: Path
             result = tsttc(command[0], tmp_path / name, "--manifest", tmp_path / "manifest.csv", *command[1:])
             assert result.exit_code == 1
             assert words in " ".join(result.stderr.split())
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        ["5.31", "1", "2", "3"],
+        ["5,31", "1", "2", "3"],
+        [True, False, True, True],
+        np.array(SECONDS) + 1j,
+        pd.to_datetime(["2020-01-01"] * 4),
+        pd.to_timedelta(SECONDS, unit="s"),
+        [[1.0], [2.0], [3.0], [4.0, 5.0]],
+    ],
+)
+@pytest.mark.parametrize("column", ["ttc", "scale_ratio", "fps"])
+def test_a_column_of_a_frame_that_has_no_real_numbers_is_named(values: Any, column: str) -> None:
+    others = {"anno_id": range(4), "scale_ratio": [0.9] * 4, "fps": [10.0] * 4}
+    frame = pd.DataFrame(({"anno_id": range(4)} if column == "ttc" else others) | {column: values})
+    with pytest.raises(TypeError, match=f"In the column '{column}': The values are .*expected"):
+        predictions_from_frame(frame, manifest=MANIFEST)
+
+
+@pytest.mark.parametrize("dtype", ["object", "category", "Float64", "float32"])
+def test_a_column_of_any_real_type_is_read(dtype: Any) -> None:
+    frame = pd.DataFrame({"anno_id": range(4), "ttc": pd.Series([5.5, -12.5, 3.25, -4.5]).astype(dtype)})
+    read = predictions_from_frame(frame, manifest=MANIFEST)
+    assert read.ttc_s.tolist() == [5.5, -12.5, 3.25, -4.5]
