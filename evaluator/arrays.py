@@ -27,8 +27,9 @@ def as_floats(values: Any) -> Floats:
     elif isinstance(values, list | tuple) and values and hasattr(values[0], "detach"):
         values = [as_floats(value) for value in values]
     array = ma.asanyarray(values) if isinstance(values, ma.MaskedArray) else _array(values)
-    if array.dtype.kind in "cmMbSUV":
-        raise TypeError(f"The values are of type {array.dtype}; expected real numbers.")
+    kind = _kind_of_others(array)
+    if kind:
+        raise TypeError(f"The values are of type {kind}; expected real numbers.")
     if isinstance(array, ma.MaskedArray):
         return np.asarray(ma.filled(array.astype(np.float64), np.nan))
     try:
@@ -36,6 +37,16 @@ def as_floats(values: Any) -> Floats:
     except (TypeError, ValueError, OverflowError):
         type_name = type(values if array.ndim == 0 else array.flat[0]).__name__
         raise TypeError(f"The values are of type {type_name}; expected real numbers of float64.") from None
+
+
+def _kind_of_others(array: NDArray[Any]) -> str:
+    """Name the type of values that are no real numbers, though numpy would convert them; else empty."""
+    if array.dtype.kind in "cmMbSUV":
+        return str(array.dtype)
+    # An array of objects converts each of them by itself.
+    others = (each for each in array.flat if isinstance(each, str | bytes | bool | np.bool_))
+    other = next(others, None) if array.dtype.kind == "O" else None
+    return "" if other is None else type(other).__name__
 
 
 def _array(values: Any) -> NDArray[Any]:
