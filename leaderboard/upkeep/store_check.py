@@ -4,7 +4,8 @@ A directory that is not mounted can be written to as well, so the store must hav
 """
 
 import shutil
-from datetime import datetime
+import socket
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Final
 
@@ -22,21 +23,29 @@ EVERY_S: Final = 60.0
 # Beside the prediction files, so that it needs the rights that they need; no digest has this name.
 PROBE: Final = "predictions/probe"
 MAX_MANIFESTS: Final = 5
+# Machines with workers take turns by chance. One that has not complained for so long is well, or gone.
+SILENT: Final = timedelta(minutes=10)
 _CONTENT: Final = b"This file shows that the file store can be written to.\n"
 
 
 def check(*, now: datetime) -> None:
-    """Note whether files can be stored, and the room that is left. Raises the database's error."""
+    """Note whether files can be stored, and the room that is left. Raises the database's error.
+
+    A machine whose workers can store files says nothing of another one, which may lack the mount.
+    """
+    machine = socket.gethostname()
     free_bytes: int | None = None
     try:
         free_bytes = _free_bytes()
         _try()
     except OSError as fault:
         reason = f"{type(fault).__name__}: {fault}"
-        if faults.note(faults.STORE, reason=reason, now=now):
+        if faults.note(faults.STORE, subject=machine, reason=reason, now=now):
             log.error("store_cannot_be_written", reason=reason[:500])
     else:
-        faults.clear(faults.STORE)
+        faults.clear(faults.STORE, subject=machine)
+        for silent in faults.present([faults.STORE], now=now).filter(last_at__lte=now - SILENT):
+            faults.clear(faults.STORE, subject=silent.subject)
     SweepBeat.objects.update(store_checked_at=now, store_free_bytes=free_bytes)
 
 

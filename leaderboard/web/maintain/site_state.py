@@ -68,7 +68,8 @@ def _ground_truth() -> Line:
 def _store(*, now: datetime) -> Line:
     fault = faults.present([faults.STORE], now=now).first()
     if fault is not None:
-        return Line("File store", _lasting("files cannot be stored", fault, now=now), True, (fault.reason,))
+        what = f"files cannot be stored by the workers of {fault.subject}"
+        return Line("File store", _lasting(what, fault, now=now), True, (fault.reason,))
     beat = SweepBeat.objects.exclude(store_checked_at=None).first()
     if beat is None or beat.store_checked_at is None:
         return Line("File store", "not checked yet")

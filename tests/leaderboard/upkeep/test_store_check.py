@@ -1,5 +1,7 @@
 """The check of the file store: it can be written to, and it is the site's own."""
 
+import socket
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -57,16 +59,27 @@ def test_a_new_site_has_nothing_to_look_for(benchmark: None) -> None:
     assert is_well()
 
 
-def test_two_workers_of_which_one_has_another_store_are_counted(
-    two_editions: list[Edition], settings: Settings, tmp_path: Path
+def test_the_fault_of_one_machine_lasts_until_that_machine_is_well_or_silent(
+    two_editions: list[Edition], settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mounted = settings.STORAGES
     options = {**mounted["files"].get("OPTIONS", {}), "location": str(tmp_path / "other")}
     astray = {**mounted, "files": {**mounted["files"], "OPTIONS": options}}
-    for _ in range(3):
-        settings.STORAGES = astray
-        assert not is_well()
-        settings.STORAGES = mounted
-        assert is_well()
-    # The alarm counts, so it fires although every second look finds no fault.
-    assert Fault.objects.get(kind=faults.STORE).n_ever == 3
+    now = timezone.now()
+
+    def look(machine: str, *, has_store: bool, minutes: int) -> bool:
+        monkeypatch.setattr(socket, "gethostname", lambda: machine)
+        settings.STORAGES = mounted if has_store else astray
+        store_check.check(now=now + timedelta(minutes=minutes))
+        return health.can_store(now=now + timedelta(minutes=minutes))
+
+    assert not look("one", has_store=False, minutes=0)
+    assert not look("two", has_store=True, minutes=1)
+    assert not look("one", has_store=False, minutes=2)
+    assert not look("two", has_store=True, minutes=3)
+    assert Fault.objects.get(kind=faults.STORE, subject="one").n_times == 2
+    assert look("one", has_store=True, minutes=4)
+    assert not look("one", has_store=False, minutes=5)
+    assert not look("two", has_store=True, minutes=14)
+    # It was taken away: nobody can say that it is well.
+    assert look("two", has_store=True, minutes=15)
