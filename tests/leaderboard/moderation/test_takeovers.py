@@ -427,3 +427,21 @@ def test_a_former_address_finds_the_accounts_that_had_it(victim: User, stranger:
     assert takeovers.with_former_address("other.example") == {stranger.pk}
     assert takeovers.with_former_address("example") == {victim.pk, stranger.pk}
     assert takeovers.with_former_address(" ") == set()
+
+
+def test_a_former_address_is_told_of_changes_for_less_than_a_week(victim: User) -> None:
+    now = timezone.now()
+
+    def told(days: float) -> set[str]:
+        links = takeovers.note(
+            user=victim,
+            what="email_changed",
+            before=[f"day-{days}@example.org"],
+            now=now + timedelta(days=days),
+        )
+        return set(links)
+
+    assert told(0) == {"day-0@example.org"}
+    assert told(3) == {"day-0@example.org", "day-3@example.org"}
+    # Each change is within a week of the one before.
+    assert told(7) == {"day-3@example.org", "day-7@example.org"}

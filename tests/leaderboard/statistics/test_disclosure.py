@@ -335,11 +335,12 @@ def test_the_published_interval_of_a_hidden_difference_holds_both_differences(
     middle: float, below: float, above: float, least_step: float, decimals: int
 ) -> None:
     # The shown difference is that of two rounded values, and may lie outside of the computed interval.
-    exact = Difference(middle, middle - below, middle + above, 0.01)
+    low, high = middle - below, middle + above
+    exact = Difference(middle, low, high, 0.01)
     for shown in (round(middle, decimals), round(middle + 0.1, decimals), round(middle - 0.1, decimals)):
         public = published(exact, replace(exact, difference=shown), least_step=least_step)
-        assert public.low <= min(shown, exact.low) + 1e-9
-        assert max(shown, exact.high) - 1e-9 <= public.high
+        assert public.low <= min(shown, low) + 1e-9
+        assert max(shown, high) - 1e-9 <= public.high
 
 
 def test_withheld_pairs_of_a_board_are_not_computed_for_the_database_either(
