@@ -102,3 +102,27 @@ def test_a_deleted_method_comes_along_to_another_team_and_takes_no_name(
     invitations.accept(secret=secret, user=owner, now=timezone.now())
     assert set(Method.objects.values_list("name", "team")) == {("Broken Net", theirs.pk)}
     assert [method.name for method in Method.objects.of(stranger)] == ["Broken Net"]
+
+
+def test_of_two_empty_methods_one_is_deleted_with_its_files_and_the_other_stays(
+    edition: Edition, rejected: Submission, owner: User
+) -> None:
+    other = builders.submit(owner, b"{}", method="Other Net", visibility="PRIVATE")
+    builders.score_all()
+    empty_methods.delete(method=rejected.method, actor=owner, now=timezone.now())
+    for sent, is_deleted in ((rejected, True), (other, False)):
+        sent.refresh_from_db()
+        assert (sent.withdrawn_at is not None) is is_deleted
+        assert (Method.objects.get(pk=sent.method_id).deleted_at is not None) is is_deleted
+    assert AuditEvent.objects.filter(verb="deleted").count() == 1
+
+
+def test_a_method_without_any_file_is_deleted_by_its_team_alone(
+    edition: Edition, rejected: Submission, owner: User, stranger: User, maintainer: User
+) -> None:
+    intake.withdraw(submission=rejected, actor=owner, now=timezone.now())
+    for other in (stranger, maintainer):
+        with pytest.raises(Refused, match="Only the team"):
+            empty_methods.delete(method=rejected.method, actor=other, now=timezone.now())
+    empty_methods.delete(method=rejected.method, actor=owner, now=timezone.now())
+    assert Method.objects.get(pk=rejected.method_id).deleted_at is not None

@@ -142,7 +142,8 @@ def test_names_and_texts_of_other_teams_and_methods_stay(
         description="D", paper_url="https://example.org/p", code_url="https://example.org/c"
     )
     first, now = pair[0].method, timezone.now()
-    hiding.clear_texts(method=first, reason="R", actor=maintainer)
+    cleared = hiding.clear_texts(method=first, reason="R", actor=maintainer)
+    assert (cleared, cleared.description) == (first, "")
     hiding.rename_method(method=first, name="New method", reason="R", actor=maintainer, now=now)
     hiding.rename_team(team=first.team, name="New team", reason="R", actor=maintainer, now=now)
     fields = ("name", "team__name", "description", "paper_url", "code_url")
