@@ -139,7 +139,10 @@ def test_rank_ranges_are_explained_with_and_without_quoted_rows() -> None:
         "With 95% confidence, the best of a column is one of its grey values."
     )
     quoted = drawn(rows=rows, sources=[SOURCE]).rank_ranges
-    assert "rows quoted from papers never have a range. With" in quoted
+    assert (
+        "rows quoted from papers never have a range. For this, a value quoted from a paper counts as if it "
+        "had a confidence interval as wide as that of the submission. With"
+    ) in quoted
     assert quoted.endswith("one of its grey values, or a row quoted from a paper.")
 
 
