@@ -445,3 +445,36 @@ def test_a_former_address_is_told_of_changes_for_less_than_a_week(victim: User) 
     assert told(3) == {"day-0@example.org", "day-3@example.org"}
     # Each change is within a week of the one before.
     assert told(7) == {"day-3@example.org", "day-7@example.org"}
+
+
+@pytest.mark.parametrize("how", ["by a link", "by a maintainer"])
+def test_ways_into_the_accounts_of_others_stay_when_one_is_given_back(
+    victim: User, stranger: User, maintainer: User, how: str
+) -> None:
+    now = timezone.now()
+    EmailAddress.objects.create(user=stranger, email="mine@example.org", verified=True, primary=True)
+    links = takeovers.note(user=victim, what="email_changed", before=["old@example.org"], now=now)
+    for user in (victim, stranger):
+        builders.token(user)
+        Authenticator.objects.create(user=user, type=Authenticator.Type.TOTP, data={})
+        SocialAccount.objects.create(user=user, provider="github", uid=user.name)
+        AccountChange.objects.create(user=user, what="email_changed", before=[])
+    if how == "by a link":
+        secret = links["old@example.org"].rstrip("/").rpartition("/")[2]
+        takeovers.undo(secret=secret, since=None, now=timezone.now())
+    else:
+        takeovers.give_back(
+            user=victim, address="old@example.org", reason="R", actor=maintainer, now=timezone.now()
+        )
+    for user, n_left in ((victim, 0), (stranger, 1)):
+        left = [
+            ApiToken.objects.filter(user=user, revoked_at=None).count(),
+            Authenticator.objects.filter(user=user).count(),
+            SocialAccount.objects.filter(user=user).count(),
+            AccountChange.objects.filter(user=user, undone_at=None).count(),
+            int(User.objects.get(pk=user.pk).has_usable_password()),
+        ]
+        assert left == [n_left] * 5
+    assert list(EmailAddress.objects.filter(user=stranger).values_list("email", "primary")) == [
+        ("mine@example.org", True)
+    ]
