@@ -73,7 +73,11 @@ INLINE: Final = frozenset(
     }
 )
 AS_WRITTEN: Final = frozenset({"pre", "textarea", "script", "style"})
-RANDOM: Final = re.compile(r'(?<=name="csrfmiddlewaretoken" value=")[^"]+|(?<=X-CSRFToken": ")[^"]+')
+# The token of a form, and the digest in the name of a style or script.
+RANDOM: Final = re.compile(
+    r'(?<=name="csrfmiddlewaretoken" value=")[^"]+|(?<=X-CSRFToken": ")[^"]+'
+    r"|(?<=\.)[0-9a-f]{12}(?=\.(?:css|js)\b)"
+)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -33,19 +33,21 @@ def legend(board: Board, table: BoardTable, *, ladder: Ladder | None) -> Legend:
 
 def _marks(board: Board, table: BoardTable, *, ladder: Ladder | None) -> SafeString:
     all_rows = f" of all {grouped(board.n_in_all)}" if table.query.filters.is_set else ""
-    parts = [
+    parts: list[str] = [
         format_html("Lower is better. <strong>Bold</strong>: best{}", all_rows),
-        SafeString(", <u>underlined</u>: second best"),
+        format_html(", <u>{}</u>: second best", "underlined"),
     ]
     if table.has_rank_ranges:
         parts.append(
-            SafeString(', <span class="with-best-sample">grey</span>: may be the best (95% confidence)')
+            format_html(
+                ', <span class="with-best-sample">{}</span>: may be the best (95% confidence)', "grey"
+            )
         )
         if ladder and not ladder.is_certain:
             # A word joiner: the line does not break after the dash.
-            parts.append(SafeString(", (a–&#8288;b): 95% rank range"))
+            parts.append(", (a–\N{WORD JOINER}b): 95% rank range")
     elif table.has_intervals:
-        parts.append(SafeString('<span class="interval">, band: interval of the best</span>'))
+        parts.append(format_html('<span class="interval">{}</span>', ", band: interval of the best"))
     if table.moved_since:
         parts.append(format_html(", ▲▼: moved since {}", day(table.moved_since)))
     return format_html("{}.", format_html_join("", "{}", ((part,) for part in parts)))
