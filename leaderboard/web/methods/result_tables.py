@@ -51,6 +51,11 @@ class ResultTable:
     without_interval: tuple[str, ...] = ()  # of a row with intervals: what has none, and why
 
     @property
+    def definitions(self) -> str:
+        """Return its metrics in words, with their symbols."""
+        return f"{', '.join(f'{metric.title} ({metric.symbol})' for metric in self.metrics)}."
+
+    @property
     def has_intervals(self) -> bool:
         return any(cell.interval for row in self.rows for cell in row.cells)
 

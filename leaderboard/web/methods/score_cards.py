@@ -48,6 +48,19 @@ class ScoreCard(NamedTuple):
     is_log: bool  # the scale of the strip
     ends: tuple[str, str]  # the lowest and the highest value on it
 
+    @property
+    def caption(self) -> str:
+        """Say what the strip draws, and whether its board shows the tall mark."""
+        scale = " (log scale)" if self.is_log else ""
+        if not self.entry.rank:
+            mark = "submission, which the board does not show"
+        else:
+            mark = "one" if self.entry.is_visible_to_all else "one, which is private"
+        return (
+            f"{self.metric.symbol} of every method on the board{scale}, from {' to '.join(self.ends)}; "
+            f"the tall mark is this {mark}. Lower is better."
+        )
+
 
 def score_card(entry: Entry, rows: Sequence[Entry], *, n_ranked: int, gap: Gap | None) -> ScoreCard | None:
     """Make the card of an entry among `rows`, which everybody sees; None without a value."""

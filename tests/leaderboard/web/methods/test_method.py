@@ -59,7 +59,7 @@ def test_its_values_are_those_of_the_board(client: Client, method: Method) -> No
     assert [*mids, *rtes] == row[2:]
     card = main.one("dl", class_="score-card").text
     assert row[2] in card
-    assert f"Rank{row[0]} of 6" in card
+    assert f"Rank {row[0]} of 6" in card
 
 
 def test_each_split_stands_in_its_own_section(
@@ -112,7 +112,7 @@ def test_head_says_the_score_its_lead_and_the_way_there(client: Client, method: 
         for name in ("Deep Scale", "Foo")
     )
     card = main.one("dl", class_="score-card")
-    assert f"Lead over the second{best - own:.1f} ×10⁻⁴Deep Scale, {best}" in card.text
+    assert f"Lead over the second {best - own:.1f} ×10⁻⁴ Deep Scale, {best}" in card.text
     assert "2 submissions, in order" in card.text
     assert len(card.all("svg", class_="sparkline")) == 1
     Method.objects.update(visibility=Visibility.ANONYMOUS)
@@ -145,7 +145,7 @@ def test_nearby_ranks_are_those_that_they_would_be_beside_a_private_method(
     builders.board_changed("test")
     client.force_login(owner)
     main = get(client, method).one("main")
-    assert "Rank if public1 of 6" in main.one("dl", class_="score-card").text
+    assert "Rank if public 1 of 6" in main.one("dl", class_="score-card").text
     rows = main.one("table", class_="gaps").one("tbody").all("tr")
     ranks = [(row.all("td")[0].text, row.one("th").text) for row in rows]
     assert ranks == [("", "This methodwould be rank 1"), ("2", "Deep Scale"), ("3", "Deep Scale (NeRF)")]
@@ -159,7 +159,7 @@ def test_own_anonymous_method_among_nearby_ranks_has_its_name_for_its_team_alone
     builders.submit(owner, builders.predictions(edition, factor=1.06), method="Bar", visibility="ANONYMOUS")
     builders.score_all()
     pseudonym = Method.objects.get(name="Bar").pseudonym
-    for reader, name in ((None, pseudonym), (owner, f"Baryours, shown as {pseudonym}")):
+    for reader, name in ((None, pseudonym), (owner, f"Bar yours, shown as {pseudonym}")):
         if reader:
             client.force_login(reader)
         rows = get(client, method).one("table", class_="gaps").one("tbody").all("tr")
@@ -178,7 +178,7 @@ def test_nearby_differences_have_their_intervals_once_a_worker_has_computed_them
     builders.infer_all()
     gaps.append(pages.get(client, address).one("table", class_="gaps").text)
     assert ["computing…" in text for text in gaps] == [True, False]
-    assert re.search(r"1This method[0-9.]+\s*2Bar[0-9.]+−[0-9.]+−[0-9.]+ to −[0-9.]+", gaps[1])
+    assert re.search(r"1 This method [0-9.]+ 2 Bar [0-9.]+ −[0-9.]+ −[0-9.]+ to −[0-9.]+", gaps[1])
 
 
 def test_own_method_offers_the_next_submission_and_lists_the_rejected_ones(
