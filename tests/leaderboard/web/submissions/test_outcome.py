@@ -54,7 +54,7 @@ def test_rank_is_the_boards_with_its_range(signed_in: Client, inferred: list[Sub
     n_ranked = sum(row.rank is not None for row in board_now().entries)
     ends = {interval.rank_low, interval.rank_high}
     within = "–".join(str(end) for end in sorted(end for end in ends if end is not None))
-    assert f"Rank{row.rank} of {n_ranked}95% range ({within})" in card(look(signed_in, inferred[1]))
+    assert f"Rank {row.rank} of {n_ranked} 95% range ({within})" in card(look(signed_in, inferred[1]))
 
 
 def test_maintainer_reads_the_same_rank_of_a_private_one_and_nobody_quotes_it(
@@ -63,7 +63,7 @@ def test_maintainer_reads_the_same_rank_of_a_private_one_and_nobody_quotes_it(
     sent = builders.submit(owner, builders.predictions(edition, factor=1.01), visibility="PRIVATE")
     builders.score_all()
     root = look(keeper, sent)
-    assert "Rank if public1 of" in card(root)
+    assert "Rank if public 1 of" in card(root)
     strip = root.one("figure", class_="all-values").text
     assert "every method on the board (log scale), from" in strip
     assert "the tall mark is this one, which is private" in strip
