@@ -5,6 +5,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import pytest
 import yaml
 
 from leaderboard import benchmark
@@ -12,6 +13,7 @@ from leaderboard import benchmark
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.slow
 def test_the_citation_file_is_valid_and_in_step_with_the_version_and_the_paper() -> None:
     command = ["-m", "check_jsonschema", "--builtin-schema", "vendor.citation-file-format", "CITATION.cff"]
     done = subprocess.run(

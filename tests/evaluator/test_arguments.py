@@ -227,6 +227,7 @@ print(report)
 """
 
 
+@pytest.mark.slow
 def test_the_library_scores_without_what_the_command_needs() -> None:
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT_THE_COMMAND],

@@ -68,6 +68,7 @@ def test_toolkit_s_result_file_is_taken_as_it_is(tmp_path: Path) -> None:
     assert printed(EXAMPLES / "toolkit_results.py", tmp_path) == expected
 
 
+@pytest.mark.slow
 def test_better_model_is_better_by_more_than_chance(tmp_path: Path) -> None:
     lines = printed(EXAMPLES / "intervals.py", tmp_path)
     assert re.fullmatch(r"MiD of the new one: \d+\.\d \[\d+\.\d, \d+\.\d\]", lines[0])
@@ -75,6 +76,7 @@ def test_better_model_is_better_by_more_than_chance(tmp_path: Path) -> None:
     assert float(lines[1].rpartition("p = ")[2]) < 0.05
 
 
+@pytest.mark.slow
 def test_a_training_loop_gets_better_and_ends_with_a_file(tmp_path: Path) -> None:
     *epochs, worst, last = printed(EXAMPLES / "training_loop.py", tmp_path)
     mid_by_epoch = [float(line.partition("MiD ")[2].partition(",")[0]) for line in epochs]

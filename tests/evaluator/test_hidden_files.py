@@ -26,6 +26,7 @@ def add_files_of_macos(folder: Path) -> None:
     (folder / ".Trashes" / "old.pkl").write_bytes(b"old")
 
 
+@pytest.mark.slow
 def test_an_annotation_folder_of_a_mac_is_read_as_without_its_files(tmp_path: Path) -> None:
     folder = driving_folder(tmp_path / "annotations")
     digest = read_manifest(folder).digest

@@ -26,6 +26,7 @@ def test_a_crucial_value_of_a_small_split_is_all_but_published() -> None:
     assert error_s("crucial", WAYS["RTE"], n_sequences=28_600) > 3 * error_s("crucial", WAYS["RTE"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RANGES)
 def test_mid_tells_a_value_as_well_as_rte_so_a_coarser_rte_would_hide_little(name: str) -> None:
     assert error_s(name, WAYS["MiD"]) == pytest.approx(error_s(name, WAYS["RTE"]), rel=0.3, abs=0.02)

@@ -66,6 +66,7 @@ def test_links_that_people_gave_are_marked_in_every_template() -> None:
     assert [link for link in links if 'rel="nofollow ugc"' not in link] == []
 
 
+@pytest.mark.slow
 def test_links_that_people_gave_are_marked_on_every_page(edition: Edition, owner: User) -> None:
     sent = builders.submit(
         owner,

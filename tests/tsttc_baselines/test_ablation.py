@@ -28,6 +28,7 @@ def truth(rendered: Path) -> GroundTruth:
     return read_truth(rendered / "truth.csv")
 
 
+@pytest.mark.slow
 def test_wider_gaps_have_smaller_errors(rendered: Path, truth: GroundTruth) -> None:
     rows = scores_of_settings(get_ablation("frame-gap"), folder=read_folder(rendered), truth=truth)
     assert rows[0].scores["mid"] > rows[-1].scores["mid"]

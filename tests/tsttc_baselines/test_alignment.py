@@ -29,6 +29,7 @@ def test_any_frame_can_be_the_reference(frame_gap: int) -> None:
     assert alpha(planted(0.8), frame_gap) == pytest.approx(0.8 ** (frame_gap / 5), abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gain", "offset"), [(0.6, 0), (0.85, 15), (1.15, -15), (1.0, 12), (1.05, 3)])
 def test_gain_and_offset_move_the_estimate_by_less_than_a_thousandth(gain: float, offset: float) -> None:
     clip = planted(0.85)
@@ -40,12 +41,14 @@ def test_gain_and_offset_move_the_estimate_by_less_than_a_thousandth(gain: float
     assert alpha(changed(clip, expose)) == pytest.approx(alpha(clip), abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale_ratio", [0.75, 0.92, 1.25])
 def test_frames_in_reverse_order_give_the_reciprocal(scale_ratio: float) -> None:
     clip = planted(scale_ratio)
     assert alpha(clip) * alpha(swapped(clip)) == pytest.approx(1, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("zoom", [0.5, 0.7, 1.4, 2.0])
 def test_the_size_of_the_image_does_not_matter(zoom: float) -> None:
     clip = planted(0.85)
@@ -59,6 +62,7 @@ def test_the_size_of_the_image_does_not_matter(zoom: float) -> None:
     assert alpha(resized) == pytest.approx(alpha(clip), rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_wrong_reference_box_does_no_harm() -> None:
     clip = planted(0.8)
     clip.boxes[0] += np.array([-4, -4, 4, 4])  # larger by about a tenth, so the boxes alone say 0.88

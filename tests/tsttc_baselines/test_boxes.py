@@ -12,6 +12,7 @@ sides = st.floats(4, 300)
 coordinates = st.floats(0, 500)
 
 
+@pytest.mark.slow
 @given(x=coordinates, y=coordinates, width=sides, height=sides, ratio=st.floats(0.5, 2))
 def test_expansion_keeps_the_centre_and_multiplies_both_sides(
     x: float, y: float, width: float, height: float, ratio: float

@@ -118,6 +118,7 @@ def test_an_installed_package_has_its_method_in_the_list(here: Path) -> None:
     assert json.loads(done.stdout)["parameters"] == {"weights": "weights.txt", "power": 1.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -45,6 +45,7 @@ def test_the_matrix_product_is_the_literal_loop(
     assert np.argmin(errors) == np.argmin(literal)
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(
     seed=st.integers(0, 1000), width=st.floats(8, 150), height=st.floats(8, 110), max_shift=st.integers(0, 3)

@@ -56,6 +56,7 @@ def root_of_areas(first: Sequence[float], last: Sequence[float]) -> float:
     return math.sqrt(area(first) / area(last))
 
 
+@pytest.mark.slow
 def test_the_file_holds_every_sequence_and_how_it_was_made(folder: Path) -> None:
     done = estimate(folder, power=0.5)
     data = (folder.parent / "p.json").read_bytes()
@@ -73,6 +74,7 @@ def test_the_file_holds_every_sequence_and_how_it_was_made(folder: Path) -> None
     assert names(folder) == {"p.json"}
 
 
+@pytest.mark.slow
 def test_a_gap_of_one_looks_at_two_frames(folder: Path) -> None:
     for anno_id in range(N):
         for frame in range(4):
@@ -113,6 +115,7 @@ JPG = f"images/0007/cam1/{stamp(1, 3)}.jpg"
 BOX_0, BOX_5 = "(50, 30, 90, 60)", "(45, 25, 95, 65)"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "reason", "where", "message"),
     [
@@ -180,6 +183,7 @@ def test_a_strict_run_names_every_missing_box_and_image_before_it_begins(folder:
     assert names(folder) == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "suffix"), [(cut_off, ".jpg"), (cut_off_png, ".png")], ids=["JPEG", "PNG"]
 )
@@ -193,6 +197,7 @@ def test_an_image_that_is_cut_off_is_not_taken_for_a_whole_one(
     assert "inside a " in problem.message
 
 
+@pytest.mark.slow
 def test_what_a_method_cannot_say_and_where_it_fails_take_the_fallback(folder: Path) -> None:
     done = estimate(folder, refused=0, broken=2)
     assert done.n_fallback == {"box has no texture": 1, "the method failed with ZeroDivisionError": 1}
@@ -235,6 +240,7 @@ def test_an_ended_run_continues_and_gives_the_same_file(folder: Path) -> None:
     assert (folder.parent / "p.json").read_bytes() == (folder.parent / "whole.json").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_fallback_of_the_ended_run_is_estimated_again(folder: Path) -> None:
     path = image_path(folder, 1, 3)
     path.rename(folder / "aside")
@@ -245,6 +251,7 @@ def test_a_fallback_of_the_ended_run_is_estimated_again(folder: Path) -> None:
     assert (done.n_resumed, done.n_fallback) == (2, {})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change", [{"power": 2.0}, {"frame_gap": 4}, {"boxes": True}], ids=["parameter", "gap", "boxes"]
 )

@@ -50,6 +50,7 @@ def test_script_1_ends_with_the_smallest_gap_of_its_closed_form() -> None:
     np.testing.assert_allclose(expected_m, [21.81, 11.57, 3.91], atol=CENTIMETRE)
 
 
+@pytest.mark.slow
 def test_script_4_at_80_km_per_h_ends_in_contact_and_would_end_17_m_beyond() -> None:
     assert solve(of_script(4)).last.gap_m[1, 0] == pytest.approx(0, abs=1e-9)
     through = Run(**{name: getattr(of_script(4)[1], name) for name in Run.__slots__} | {"end_gap_m": -100.0})

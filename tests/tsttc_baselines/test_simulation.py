@@ -31,6 +31,7 @@ def test_sequences_beyond_20_s_lie_in_no_range() -> None:
     assert drawn.truth.n_outside(TTC_RANGES) == 8
 
 
+@pytest.mark.slow
 def test_the_same_generator_gives_the_same_split_and_another_one_another(drawn: Split) -> None:
     again = split(rng=np.random.default_rng(5), n_sequences=N, n_recordings=50)
     assert again.truth.digest == drawn.truth.digest
@@ -68,6 +69,7 @@ def test_the_windows_of_a_track_follow_one_another_and_their_motion_goes_on(draw
             assert np.abs(np.diff(speed)).max() < 0.2
 
 
+@pytest.mark.slow
 def test_the_scripts_alone_make_a_split_with_up_to_6_s_to_contact() -> None:
     drawn = simulation.scripted_split(rng=np.random.default_rng(2), closed=False)
     assert drawn.n_sequences > 1_000

@@ -22,6 +22,7 @@ COMMAND = "tsttc baseline render examples/baseline --sequences 12 --recordings 4
 Tsttc = Callable[..., Result]
 
 
+@pytest.mark.slow
 def test_the_example_is_made_by_the_command_that_its_documents_give(tsttc: Tsttc, tmp_path: Path) -> None:
     # The commands of a folder's own page run in this folder.
     for page, command in {
@@ -46,6 +47,7 @@ def image(path: Path) -> Image:
     return np.asarray(cv2.imread(str(path)), dtype=np.uint8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "most_mid"), [("detection", 400), ("tracking", 15), ("pixel-mse", 20), ("alignment", 8)]
 )

@@ -37,6 +37,7 @@ def download(folder: Path, *, as_array: bool = False, **changes: Any) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("as_array", [False, True], ids=["list", "array"])
 def test_boxes_and_frames_are_those_of_the_annotation_files(tmp_path: Path, as_array: bool) -> None:
     folder = read_folder(download(tmp_path, as_array=as_array))
@@ -57,6 +58,7 @@ def run_on(folder: Path, *, keys: KeyKind = "natural_key") -> bytes:
     return out.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_run_over_a_download_is_a_file_for_any_manifest_of_its_sequences(tmp_path: Path) -> None:
     folder = download(tmp_path)
     own = read_manifest(folder)
@@ -89,6 +91,7 @@ def write_renumbered(folder: Path, own: Manifest) -> None:
     (folder / "manifest.csv").write_text("\n".join([header, *renumbered, ""]))
 
 
+@pytest.mark.slow
 def test_a_manifest_of_other_sequences_is_refused(tmp_path: Path) -> None:
     folder = download(tmp_path)
     text = read_manifest(folder).to_csv().decode()
@@ -98,6 +101,7 @@ def test_a_manifest_of_other_sequences_is_refused(tmp_path: Path) -> None:
     assert {problem.code for problem in rejected.value.problems} == {"missing-keys", "unknown-keys"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", [None, [0.1, 0.2, 0.3], "four", [0.1, 0.2, 0.3, None], np.zeros((3, 4))])
 def test_an_object_without_a_box_is_refused_with_its_position(tmp_path: Path, wrong: object) -> None:
     with pytest.raises(Rejected) as rejected:

@@ -225,6 +225,7 @@ def test_wide_letters_keep_the_columns_in_line() -> None:
     assert lines[0].index("Shi et al.") == lines[1].index("TJU-V") + len("时间到接触")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("environment", "is_styled"), [({}, True), ({"NO_COLOR": "1"}, False)])
 def test_real_terminal_gets_bold_unless_it_asks_for_none(
     site: RecordedSite, environment: dict[str, str], is_styled: bool

@@ -79,6 +79,7 @@ def test_anything_else_is_wrong_usage_before_anything_is_sent(
     assert site.requests == []
 
 
+@pytest.mark.slow
 def test_gate_waits_shows_the_scores_and_then_sets_the_exit_code(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(POST, Reply(SCORED | {"state": "QUEUED"}, status=201))
     site.put(f"GET /api/v1/submissions/{ID}", Reply(SCORED | {"scores": SCORES}))
@@ -154,6 +155,7 @@ def test_file_may_be_compared_with_a_row_of_a_paper(tsttc: Tsttc, site: Recorded
     assert submit(tsttc, "--fail-if-worse-than", "Deep Scale").exit_code == 6
 
 
+@pytest.mark.slow
 def test_row_of_a_paper_comes_before_methods_that_took_its_name(tsttc: Tsttc, site: RecordedSite) -> None:
     quoted = entry("Deep Scale", 14.4, method_id=None, kind="published") | {"id": "published:deep-scale"}
     taken = entry("Deep Scale", 99.0, method_id=OTHER) | {"id": OTHER}
@@ -166,6 +168,7 @@ def test_row_of_a_paper_comes_before_methods_that_took_its_name(tsttc: Tsttc, si
     assert submit(tsttc, "--fail-if-worse-than", OTHER).exit_code == 0
 
 
+@pytest.mark.slow
 def test_first_file_of_a_method_has_nothing_of_its_own_to_be_worse_than(
     tsttc: Tsttc, site: RecordedSite
 ) -> None:

@@ -151,6 +151,7 @@ def test_file_that_cannot_be_read_is_explained(tsttc: Tsttc) -> None:
     assert f"{UNREADABLE} cannot be read: " in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", own_commands())
 def test_every_command_explains_itself_with_an_example(tsttc: Tsttc, command: str) -> None:
     result = tsttc(command, "--help")
@@ -194,6 +195,7 @@ def modules_of(program: str) -> set[str]:
     return set(done.stderr.split())
 
 
+@pytest.mark.slow
 def test_help_loads_none_of_the_heavy_libraries() -> None:
     loaded = modules_of("from evaluator.cli import main; main(['--help'], standalone_mode=False)")
     heavy = {"numpy", "httpx2", "rich", "msgspec", "keyring", "cryptography", "jwt", "asyncio", "django"}
@@ -201,6 +203,7 @@ def test_help_loads_none_of_the_heavy_libraries() -> None:
     assert heavy & loaded == set()
 
 
+@pytest.mark.slow
 def test_module_runs_as_the_command() -> None:
     done = process("score", GOOD, "--truth", TRUTH, env=os.environ | {"PYTHONIOENCODING": "ascii"})
     assert done.returncode == 0

@@ -138,6 +138,7 @@ def test_manifest_of_a_split_comes_from_the_leaderboard_without_a_token(
         assert "Give either TRUTH_OR_FOLDER or --split." in tsttc("manifest", *arguments).stderr
 
 
+@pytest.mark.slow
 def test_truth_of_a_folder_becomes_a_table_with_its_objects(tsttc: Tsttc, tmp_path: Path) -> None:
     folder = write_folder(tmp_path / "folder", {"a.pkl": [camera({7: list(range(6))}, occ_ratio=0.25)]})
     path = tmp_path / "val.csv"

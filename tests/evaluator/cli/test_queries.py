@@ -43,6 +43,7 @@ def board(*names: tuple[str, str | None]) -> Reply:
     return Reply({"split": "val", "edition": 2, "entries": entries})
 
 
+@pytest.mark.slow
 def test_compare_asks_until_it_is_computed(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put("GET /api/v1/splits/val/board", board(("A", "id-a"), ("B", "id-b")))
     differences: dict[str, Any] = dict.fromkeys(SCORE_NAMES)

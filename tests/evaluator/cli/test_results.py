@@ -65,6 +65,7 @@ def test_status_says_that_intervals_are_computed_and_does_not_wait(tsttc: Tsttc,
     assert len(site.requests) == 1
 
 
+@pytest.mark.slow
 def test_wait_and_watch_end_with_the_intervals(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(POST, Reply(QUEUED, status=201))
     site.put(GET, Reply(AWAITED), Reply(AWAITED), Reply(SURE))
@@ -73,6 +74,7 @@ def test_wait_and_watch_end_with_the_intervals(tsttc: Tsttc, site: RecordedSite)
     assert json.loads(tsttc("status", ID, "--watch", "--json").stdout) == SURE
 
 
+@pytest.mark.slow
 def test_intervals_are_waited_for_only_so_long(client: Client, site: RecordedSite, clock: FakeTime) -> None:
     site.put(GET, Reply(AWAITED), Reply(status=503), Reply(AWAITED))
     *_, last = client.watch(ID, timeout_s=900)

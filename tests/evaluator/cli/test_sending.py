@@ -67,6 +67,7 @@ def test_parquet_is_sent_as_json(tsttc: Tsttc, site: RecordedSite, tmp_path: Pat
     assert json.loads(content) == {str(row): 1.5 + row for row in range(60)}
 
 
+@pytest.mark.slow
 def test_a_warning_of_the_check_is_not_repeated_with_the_scores(
     tsttc: Tsttc, site: RecordedSite, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -88,12 +89,14 @@ def test_split_without_a_manifest_is_left_to_the_server_s_words(tsttc: Tsttc, si
     assert (result.exit_code, result.stderr) == (8, "Error: The split val takes no submissions yet.\n")
 
 
+@pytest.mark.slow
 def test_answer_that_was_lost_is_no_file_sent_before(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(POST, Reply(fault=CUT), Reply(QUEUED, status=200))
     assert "already submitted" not in submit(tsttc).stdout
     assert "already submitted" in submit(tsttc).stdout, "an answer to the first try of a call"
 
 
+@pytest.mark.slow
 def test_first_submission_of_a_private_method_says_how_to_show_it(tsttc: Tsttc, site: RecordedSite) -> None:
     private = QUEUED | {"method": "Foo\x1b[2J++", "visibility": "PRIVATE"}
     site.put(POST, Reply(private, status=201), Reply(private | {"visibility": "PUBLIC"}, status=201))
@@ -165,6 +168,7 @@ def at_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("evaluator.cli.consent.sys", terminal)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["milliseconds", "ratios", "constant"])
 def test_a_job_sends_no_file_with_a_warning_unless_it_says_yes(
     tsttc: Tsttc, site: RecordedSite, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
@@ -208,6 +212,7 @@ def test_a_person_is_asked_before_a_file_with_a_warning_is_sent(
 OWN = [{"id": f"m{number}", "name": name} for number, name in enumerate(["Other", "TTC-Former", "Foo v1"])]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["TTC-Fromer", "ttc former", "TTCFormer", "TTC-Formr"])
 def test_a_new_method_with_a_name_like_another_one_is_asked_about(
     tsttc: Tsttc, site: RecordedSite, monkeypatch: pytest.MonkeyPatch, name: str

@@ -18,6 +18,7 @@ def test_the_library_knows_the_limit_of_the_server() -> None:
     assert settings.MAX_PREDICTIONS_BYTES == MAX_FILE_BYTES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["predictions.json", "predictions.csv"])
 def test_check_refuses_what_the_server_refuses_for_its_size(tsttc: Tsttc, tmp_path: Path, name: str) -> None:
     data = (EXAMPLES / "predictions.json").read_bytes()

@@ -83,6 +83,7 @@ def test_submit_sends_all_options_and_names_the_submission(tsttc: Tsttc, site: R
     assert site.posts[0].headers["User-Agent"].startswith("tsttc/")
 
 
+@pytest.mark.slow
 def test_submit_takes_standard_input(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(POST, Reply(fault=CUT), Reply(QUEUED, status=201))
     result = tsttc("submit", "-", "--split", "val", "--method", "Foo++", stdin=b'{"0": 1.5}')
@@ -109,6 +110,7 @@ def test_words_that_are_no_text_are_wrong_usage(tsttc: Tsttc, site: RecordedSite
     assert site.requests == []
 
 
+@pytest.mark.slow
 def test_wait_ends_with_the_scores(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(POST, Reply(QUEUED, status=201))
     site.put(GET, Reply(QUEUED | {"state": "RUNNING", "queue": None}), Reply(SCORED))
@@ -123,6 +125,7 @@ def test_wait_ends_with_the_scores(tsttc: Tsttc, site: RecordedSite) -> None:
     assert "Truncated predictions: 3 set to −20 s, 1 set to 0.05 s, 12 set to 20 s." in lines
 
 
+@pytest.mark.slow
 def test_json_is_the_server_s_document_alone(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(POST, Reply(QUEUED, status=201))
     site.put(GET, Reply(SCORED | {"new_member": [1]}))
@@ -131,6 +134,7 @@ def test_json_is_the_server_s_document_alone(tsttc: Tsttc, site: RecordedSite) -
     assert json.loads(tsttc("status", ID, "--json").stdout) == SCORED | {"new_member": [1]}
 
 
+@pytest.mark.slow
 def test_status_asks_once_and_watch_asks_until_the_end(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(GET, Reply(QUEUED), Reply(QUEUED), Reply(SCORED))
     once = tsttc("status", ID)
@@ -170,6 +174,7 @@ def test_submission_without_scores_says_whose_turn_it_is(
     assert words in result.stderr
 
 
+@pytest.mark.slow
 def test_timeout_says_that_the_submission_goes_on(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(POST, Reply(QUEUED, status=201))
     site.put(GET, Reply(QUEUED))
@@ -274,6 +279,7 @@ def test_name_of_a_method_cannot_steer_the_terminal(tsttc: Tsttc, site: Recorded
     assert r"\x1b[31mevil on val" in tsttc("status", ID).stdout
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_waiting_ends_quietly_with_130(site: RecordedSite) -> None:
     site.put(GET, Reply(QUEUED))
     with default_signals():

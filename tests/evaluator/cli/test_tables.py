@@ -24,6 +24,7 @@ TTC_S = read_predictions(PREDICTIONS, manifest=MANIFEST).ttc_s
 BOARD = {"split": "test", "edition": 2, "entries": []}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("at_site")
 def test_board_in_another_format_is_the_text_of_the_site(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put("GET /api/v1/splits/test/board", Reply(BOARD))
@@ -159,6 +160,7 @@ def test_completion_is_a_script_that_the_shell_takes(tsttc: Tsttc, tmp_path: Pat
         subprocess.run([program, "-n", script], check=True)
 
 
+@pytest.mark.slow
 def test_completion_knows_commands_and_options(tmp_path: Path) -> None:
     program = tmp_path / "tsttc"
     program.write_text(f"#!{sys.executable}\nfrom evaluator.cli import main\nmain(prog_name='tsttc')\n")

@@ -25,6 +25,7 @@ def test_watch_gives_every_state_until_the_final_one(client: Client, site: Recor
     assert seen[0].queue.ahead == 2
 
 
+@pytest.mark.slow
 def test_watch_asks_less_and_less_often(client: Client, site: RecordedSite, clock: FakeTime) -> None:
     site.put(ONE, *[Reply(QUEUED)] * 12, Reply(SCORED))
     list(client.watch("abc", timeout_s=600))
@@ -55,6 +56,7 @@ def test_watch_heeds_the_pace_that_a_healthy_server_asks_for(
     assert clock.slept_s == [3.0]
 
 
+@pytest.mark.slow
 def test_watch_ends_in_time_with_what_it_saw_last(
     client: Client, site: RecordedSite, clock: FakeTime
 ) -> None:

@@ -107,6 +107,7 @@ def test_mid_is_nan_where_the_scale_ratio_is_not_positive() -> None:
     assert math.isnan(MID.errors(-0.05, 3.0))
 
 
+@pytest.mark.slow
 @given(pairs=st.lists(st.tuples(times, times), min_size=1, max_size=40))
 def test_reports_equal_a_plain_loop(pairs: list[tuple[float, float]]) -> None:
     predicted_s, true_s = zip(*pairs, strict=True)

@@ -142,6 +142,7 @@ def files(draw: st.DrawFn, *, values: st.SearchStrategy[str]) -> tuple[bytes, Ma
     return (draw(blanks) + head + text + tail + draw(blanks)).encode(), manifest
 
 
+@pytest.mark.slow
 @given(file=files(values=spellings))
 def test_good_files_read_the_same_both_ways(file: tuple[bytes, Manifest]) -> None:
     assert_equivalent(*file)

@@ -42,6 +42,7 @@ def test_sums_per_recording_are_those_of_a_loop_and_add_up_to_the_report() -> No
 # --- intervals -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_intervals_are_those_of_a_plain_loop_over_the_same_weights() -> None:
     truth = world(3)
     mine = predictions(truth, 4)

@@ -217,6 +217,7 @@ def faults(data: bytes) -> set[str]:
     return set()
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(data=st.binary(max_size=60))
 @example(data=b"\x80\x04" + name("numpy", "dtype") + text("f8") + b"\x85R}b.")

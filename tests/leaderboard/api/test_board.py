@@ -7,6 +7,7 @@ from leaderboard.models import Edition, User
 from tests import builders
 
 
+@pytest.mark.slow
 def test_board_has_its_shape(edition: Edition, owner: User, client: Client) -> None:
     builders.submit(owner, builders.predictions(edition, factor=1.0000001))
     builders.score_all()

@@ -29,6 +29,7 @@ def look(client: APIClient, submission: Submission, **query: str) -> dict[str, A
     return body
 
 
+@pytest.mark.slow
 def test_intervals_and_rank_are_those_of_the_board(client: APIClient, entries: list[Submission]) -> None:
     builders.infer_all()
     rows = {row["method_id"]: row for row in client.get(BOARD, {"intervals": "1"}).json()["entries"]}
@@ -72,6 +73,7 @@ def test_private_one_has_intervals_no_range_and_the_rank_that_it_would_have(
     assert look(client, entries[0])["rank"] == 1
 
 
+@pytest.mark.slow
 def test_surpassed_one_has_intervals_and_neither_rank_nor_range(
     client: APIClient, edition: Edition, owner: User
 ) -> None:
@@ -107,6 +109,7 @@ def test_result_of_a_former_edition_has_no_rank(
     assert {interval["rank_low"] for interval in body["intervals"].values()} == {None}
 
 
+@pytest.mark.slow
 def test_list_tells_of_each_what_its_own_address_tells(
     client: APIClient, entries: list[Submission], edition: Edition, owner: User
 ) -> None:

@@ -166,6 +166,7 @@ GIVEN = re.compile(
 ON_PAGES = {"too-many-tokens", "bad-days", "bad-scope"}
 
 
+@pytest.mark.slow
 def test_every_code_in_the_source_is_documented_and_every_documented_code_is_there() -> None:
     sources = [*REPOSITORY.glob("leaderboard/**/*.py"), *REPOSITORY.glob("evaluator/**/*.py")]
     # The command line's own codes are those of its documents, in docs/cli.md.
@@ -193,6 +194,7 @@ def test_every_code_in_the_source_is_documented_and_every_documented_code_is_the
     assert documented - {*API_CODES, *PROBLEM_CODES, *receipts} == set()
 
 
+@pytest.mark.slow
 def test_no_code_stands_in_the_list_that_nobody_gives() -> None:
     by_the_framework = {
         *("parse-error", "invalid", "not-found", "method-not-allowed", "not-acceptable", "throttled"),

@@ -2,6 +2,7 @@
 
 from datetime import datetime, timedelta
 
+import pytest
 from rest_framework.test import APIClient
 
 from leaderboard.models import Edition, Split, Submission, User
@@ -35,6 +36,7 @@ def test_quota_tells_each_splits_rules_and_what_is_left(edition: Edition, owner:
     }
 
 
+@pytest.mark.slow
 def test_submission_is_answered_with_what_is_left_after_it(edition: Edition, owner: User) -> None:
     Split.objects.filter(pk="test").update(quota_limit=2, quota_min_gap=timedelta(hours=1))
     client = client_of(owner)
@@ -48,6 +50,7 @@ def test_submission_is_answered_with_what_is_left_after_it(edition: Edition, own
     assert again.json()["id"] == submitted["id"]
 
 
+@pytest.mark.slow
 def test_an_exhausted_quota_is_a_429_that_says_when_to_come_back(edition: Edition, owner: User) -> None:
     Split.objects.filter(pk="test").update(quota_limit=1, quota_window=timedelta(hours=2))
     client = client_of(owner)

@@ -43,6 +43,7 @@ def test_submit_is_answered_201_with_id_state_and_address(edition: Edition, owne
     assert Submission.objects.get(pk=body["id"]).via == "API"
 
 
+@pytest.mark.slow
 def test_scored_submission_has_the_ten_scores_and_counts(edition: Edition, owner: User) -> None:
     client = client_of(owner)
     submitted = post(client, builders.predictions(edition)).json()
@@ -71,6 +72,7 @@ def test_rejected_submission_lists_problems_with_code_message_and_where(
     assert (problem["code"], problem["where"]) == ("not-a-number", pointer(key))
 
 
+@pytest.mark.slow
 def test_list_has_the_teams_submissions_newest_first(edition: Edition, owner: User, teammate: User) -> None:
     ids = [post(client_of(owner), builders.predictions(edition, factor=f)).json()["id"] for f in (1.1, 1.2)]
     listed = client_of(teammate).get("/api/v1/submissions").json()
@@ -96,6 +98,7 @@ def test_refusal_is_a_problem_that_names_its_field(
     assert body["detail"] == body["problems"][0]["message"]
 
 
+@pytest.mark.slow
 def test_method_is_named_by_name_or_by_id(edition: Edition, owner: User, stranger: User) -> None:
     client = client_of(owner)
     first = post(client, builders.predictions(edition)).json()
@@ -115,6 +118,7 @@ def test_the_same_bytes_are_one_submission_and_cost_nothing_again(edition: Editi
     assert again.json()["quota"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", ["deadline", "archived", "admission", "quota"])
 def test_the_same_bytes_are_answered_with_the_first_submission_when_nothing_more_is_taken(
     signed_in: Client, edition: Edition, owner: User, teammate: User, change: str

@@ -80,6 +80,7 @@ def test_an_account_is_counted_whatever_its_token_and_address(
     assert APIClient().get(BOARD).status_code == 200
 
 
+@pytest.mark.slow
 def test_files_have_a_rate_of_their_own(edition: Edition, owner: User, settings: Settings) -> None:
     settings.API_RATES = {**settings.API_RATES, "signed_in": None}
     client = client_of(owner)
@@ -88,6 +89,7 @@ def test_files_have_a_rate_of_their_own(edition: Edition, owner: User, settings:
     assert statuses(client, "/api/v1/submissions") == [200] * 4
 
 
+@pytest.mark.slow
 def test_boards_as_of_a_time_have_a_rate_of_their_own(
     edition: Edition, owner: User, settings: Settings
 ) -> None:

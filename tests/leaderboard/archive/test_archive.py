@@ -51,6 +51,7 @@ def archived(tmp_path: Path) -> dict[str, bytes]:
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
+@pytest.mark.slow
 def test_every_edition_is_there_as_the_site_exports_it(
     methods: dict[str, Submission], client: Client, tmp_path: Path
 ) -> None:

@@ -76,6 +76,7 @@ def test_a_row_that_is_added_or_replaced_changes_no_board_of_the_past_and_no_for
     assert board_now().updated_at > at
 
 
+@pytest.mark.slow
 def test_a_row_that_is_removed_leaves_the_board_and_stays_on_those_of_the_past(
     keeper: Client, former: Edition
 ) -> None:

@@ -76,6 +76,7 @@ def _assert_away(answer: object, *, is_page: bool) -> None:
         assert answer.json()["code"] == "store-unavailable"  # type: ignore[attr-defined]  # the client's own
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", BROKEN, ids=errno.errorcode.get)
 def test_an_upload_to_a_broken_store_gets_503_on_page_and_api_and_leaves_no_row(
     edition: Edition, owner: User, fault: int, caplog: pytest.LogCaptureFixture

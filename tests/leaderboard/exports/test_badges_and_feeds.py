@@ -57,6 +57,7 @@ def titles(root: ET.Element) -> list[str]:
 # --- badges ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_badge_says_the_rank_and_the_value_of_the_page(methods: list[Method], client: Client) -> None:
     rows = pages.board_rows(pages.page(client.get("/board/test/")))
     for method in methods:
@@ -65,6 +66,7 @@ def test_badge_says_the_rank_and_the_value_of_the_page(methods: list[Method], cl
         assert badge(client, method) == f"TSTTC test: rank {rank}, MiD {mid}"
 
 
+@pytest.mark.slow
 def test_badge_says_what_there_is_instead_of_a_rank(
     methods: list[Method], edition: Edition, owner: User, client: Client
 ) -> None:
@@ -152,6 +154,7 @@ def test_feed_tells_what_everybody_sees_and_no_more(
     assert str(methods[0].pk) not in text
 
 
+@pytest.mark.slow
 def test_withdrawn_entries_leave_the_feed(edition: Edition, owner: User, client: Client) -> None:
     submission = builders.submit(owner, builders.predictions(edition), method="Gone")
     builders.score_all()

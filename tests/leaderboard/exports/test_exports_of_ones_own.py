@@ -34,6 +34,7 @@ def own(edition: Edition, owner: User) -> list[Method]:
     return [private, masked, public, others]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("query", ["", "?intervals=1", "?q=e&sort=-mid", "?mine=0"])
 @pytest.mark.parametrize("form", SUFFIXES)
 def test_an_export_of_a_board_has_what_everybody_sees(
@@ -99,6 +100,7 @@ def links(client: Client, address: str = "/board/test/") -> dict[str, list[str]]
     return {name: [a.attributes["href"] for a in parts[0].all("a")] for name, parts in divs.items() if parts}
 
 
+@pytest.mark.slow
 def test_the_page_offers_every_form_with_and_without_intervals(own: list[Method], client: Client) -> None:
     (offered,) = links(client, "/board/test/?sort=rte").values()
     forms = [f"/board/test.{form}?sort=rte" for form in ("csv", "json", "tex", "md", "bib")]

@@ -33,6 +33,7 @@ def _added(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     importlib.reload(boards)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_added")
 def test_format_of_one_row_is_on_the_page_at_its_address_and_on_the_command_line(
     edition: Edition, owner: User, client: Client

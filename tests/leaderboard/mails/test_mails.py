@@ -120,6 +120,7 @@ def test_a_superuser_can_sign_in_without_a_mail(away: Settings, client: Client) 
 # --- notices ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_file_sent_on_the_site_brings_one_mail_with_its_outcome(edition: Edition, owner: User) -> None:
     look_back()
     submission = builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
@@ -135,6 +136,7 @@ def test_a_file_sent_on_the_site_brings_one_mail_with_its_outcome(edition: Editi
     assert queue_due_mails() == []
 
 
+@pytest.mark.slow
 def test_nobody_gets_mails_that_they_switched_off_or_of_a_team_that_they_left(
     edition: Edition, owner: User, signed_in: Client
 ) -> None:
@@ -171,6 +173,7 @@ def test_the_teams_of_a_board_get_a_mail_about_its_new_edition(
     assert "/board/test/editions/" in text
 
 
+@pytest.mark.slow
 def test_tokens_that_end_and_splits_that_close_bring_mails_to_those_concerned(
     edition: Edition, owner: User, stranger: User
 ) -> None:
@@ -186,6 +189,7 @@ def test_tokens_that_end_and_splits_that_close_bring_mails_to_those_concerned(
     assert "close on" in Mail.objects.get(kind="deadline").subject
 
 
+@pytest.mark.slow
 def test_a_maintainer_previews_an_announcement_and_sends_it_once(
     edition: Edition, owner: User, keeper: Client
 ) -> None:
@@ -216,6 +220,7 @@ def test_a_maintainer_previews_an_announcement_and_sends_it_once(
         )
 
 
+@pytest.mark.slow
 def test_only_proved_addresses_get_notices_where_addresses_are_proved(
     settings: Settings, edition: Edition, owner: User
 ) -> None:

@@ -60,6 +60,7 @@ def state_of_all(recipient: str) -> list[tuple[bool, str, str]]:
     return [(row.ended_at is not None, row.text, row.reason) for row in rows]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dead", ["gone@example.org", "a b\n@example.org", "ä" * 70 + "@exa..mple", ""])
 def test_refused_recipients_end_their_mails_and_delay_no_other(server: smtp_server.Server, dead: str) -> None:
     queue(*[dead] * 60, "first@example.org", "second@example.org")
@@ -221,6 +222,7 @@ def test_a_server_that_wants_a_log_in_loses_no_mail(server: smtp_server.Server) 
     assert outbox.waiting() == 10
 
 
+@pytest.mark.slow
 def test_only_mails_that_wait_for_the_server_alone_count_as_old(
     server: smtp_server.Server, settings: Settings
 ) -> None:

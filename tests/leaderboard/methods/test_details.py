@@ -210,6 +210,7 @@ def test_nonsense_is_refused_in_words(
 # --- filters -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
     edition: Edition, method: Method, owner: User
 ) -> None:
@@ -278,6 +279,7 @@ def test_a_filter_tells_nothing_of_what_an_anonymous_row_hides(
     assert all(b"Veiled" in answer for answer in mine)  # what is taken along has nothing of one's own
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "value"),
     [

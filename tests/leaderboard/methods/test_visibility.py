@@ -53,6 +53,7 @@ def change(method: Method, to: str, actor: User, **options: Any) -> Method:
 # That no address shows what is hidden is proved in tests/security/test_non_interference.py.
 
 
+@pytest.mark.slow
 def test_a_new_method_is_private_and_seen_by_its_team_alone(
     client: Client, method: Method, owner: User, teammate: User, stranger: User
 ) -> None:
@@ -182,6 +183,7 @@ def test_a_withdrawn_entry_of_a_shown_method_leaves_a_stone(
     assert entry.withdrawn_at
 
 
+@pytest.mark.slow
 def test_an_anonymous_method_offers_to_be_made_public(
     client: Client, sent: Submission, method: Method, owner: User
 ) -> None:
@@ -243,6 +245,7 @@ def test_page_shows_what_others_will_see_asks_and_shows_it(
     assert left.all("form") == []
 
 
+@pytest.mark.slow
 def test_preview_of_a_method_that_has_become_anonymous_meanwhile_is_confirmed_again(
     client: Client, sent: Submission, method: Method, owner: User
 ) -> None:

@@ -20,6 +20,7 @@ def preview_of(client: Client, method: Method, token: str, query: str) -> tuple[
     return response.status_code, response.json()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", ["ANONYMOUS", "PUBLIC"])
 def test_program_previews_what_everybody_then_sees(
     client: Client, method: Method, owner: User, to: str

@@ -327,6 +327,7 @@ def test_every_alarm_has_a_fault_that_is_brought_about() -> None:
     assert {alert for alert, _ in FAULTS} == set(RULES) == NAMES.keys() | WITHOUT_NAME
 
 
+@pytest.mark.slow
 def test_no_alarm_fires_on_a_site_on_which_all_is_well(world: World) -> None:
     figures = scrape()
     assert [alert for alert, rule in RULES.items() if fires(rule, before=figures, now=figures)] == []

@@ -43,6 +43,7 @@ def test_every_command_has_one_row_in_the_maintainers_guide_and_one_in_the_list(
     assert own - set(rows) == {"build_wheel", "demo"}  # of the installation, and of `make demo`
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="only root has other accounts")
 def test_maintainers_command_runs_as_the_account_with_the_settings_of_the_site(tmp_path: Path) -> None:
     script = (REPOSITORY / "deploy/tsttc-maintain").read_text("utf-8")

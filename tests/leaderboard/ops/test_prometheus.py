@@ -133,6 +133,7 @@ def test_every_figure_is_documented_and_nothing_else(client: Client, db: None) -
     assert documented == given
 
 
+@pytest.mark.slow
 @pytest.mark.django_db
 def test_answers_are_counted_by_route_and_never_by_what_a_visitor_typed(client: Client) -> None:
     def n_of(route: str, status: str) -> float:

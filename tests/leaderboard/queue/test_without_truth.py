@@ -37,6 +37,7 @@ def state(submission: Submission) -> tuple[str, int, int, int]:
     return row.status, row.attempt, row.n_poison_strikes, row.n_infrastructure_strikes
 
 
+@pytest.mark.slow
 def test_a_worker_without_ground_truth_claims_nothing_and_nobody_is_struck(
     waiting: Submission, settings: Settings
 ) -> None:

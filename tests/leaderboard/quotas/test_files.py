@@ -44,6 +44,7 @@ def sized(n_bytes: int, number: int) -> bytes:
     return bad(number).ljust(n_bytes)
 
 
+@pytest.mark.slow
 def test_a_team_sends_so_many_bytes_a_day_to_all_splits_together(
     edition: Edition, owner: User, teammate: User, settings: Settings, tmp_path: Path
 ) -> None:

@@ -1,5 +1,6 @@
 """The floor of a board, what the ground truth itself scores: computed by workers, shown with the rows."""
 
+import pytest
 from django.test import Client
 
 from evaluator import SCORE_NAMES, write_predictions
@@ -28,6 +29,7 @@ def test_the_floor_is_what_a_file_of_the_ground_truth_itself_scores(edition: Edi
     assert floor["mid_small"] == 0
 
 
+@pytest.mark.slow
 def test_readers_see_the_floor_beside_the_rows_and_never_as_one(
     edition: Edition, owner: User, client: Client
 ) -> None:

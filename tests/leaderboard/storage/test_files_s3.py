@@ -180,7 +180,8 @@ def test_the_check_of_a_bucket_names_its_fault_until_it_works_again(
             store_check.check(now=timezone.now())
     is_well, text = _fault_of_the_store(client)
     assert not is_well
-    assert "files cannot be stored, 2 times in" in text
+    assert "files cannot be stored by the workers of" in text
+    assert "2 times in" in text
     expected = {"away": "does not answer", "no bucket": "NoSuchBucket", "wrong key": "AccessDenied"}
     assert expected[kind] in text
     settings.STORAGES = {**settings.STORAGES, **at(server)}

@@ -139,6 +139,7 @@ def assert_links_within_the_page_lead_somewhere(html: pages.Element, ids: list[s
             assert address[1:] in ids, link
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("address", PUBLIC)
 def test_public_pages_are_sound(client: Client, edition: Edition, address: str) -> None:
     response = client.get(address, follow=True)
@@ -146,6 +147,7 @@ def test_public_pages_are_sound(client: Client, edition: Edition, address: str) 
     assert_sound(response)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("address", PRIVATE)
 def test_private_pages_are_sound(client: Client, edition: Edition, owner: User, address: str) -> None:
     client.force_login(owner)
@@ -180,6 +182,7 @@ def test_a_page_of_a_fault_leads_back_to_where_one_was_with_its_filters(
     assert [a.attributes["href"] for a in root.one("main").all("a")] == [*boards, *back]
 
 
+@pytest.mark.slow
 def test_pages_of_a_submissions_life_are_sound(client: Client, edition: Edition, owner: User) -> None:
     client.force_login(owner)
     good = builders.submit(owner, builders.predictions(edition), note="a remark", commit="abc123")

@@ -42,6 +42,7 @@ def test_the_guide_lists_every_option(name: str) -> None:
     assert not missing, f"describe them in docs/cli.md, in the section {name} of baseline"
 
 
+@pytest.mark.slow
 def test_help_of_every_subcommand_needs_no_opencv(tmp_path: Path) -> None:
     (tmp_path / "cv2.py").write_text("raise ImportError('there is none')")
     program = f"""

@@ -43,6 +43,7 @@ def test_a_part_of_a_split_is_rendered_as_in_the_whole_by_any_number_of_processe
     )
 
 
+@pytest.mark.slow
 def test_an_interrupted_rendering_continues_with_the_same_options_alone(tsttc: Tsttc, tmp_path: Path) -> None:
     whole, ended = tmp_path / "whole", tmp_path / "ended"
     split = simulation.split(rng=np.random.default_rng(7), n_sequences=12, n_recordings=3)
@@ -78,6 +79,7 @@ def test_simulate_and_render_draw_the_same_split(tsttc: Tsttc, tmp_path: Path) -
     assert len(tracks.read_text().splitlines()) == 1 + 12 * 6
 
 
+@pytest.mark.slow
 def test_the_scripts_can_be_simulated_with_closed_and_half_open_triples(tsttc: Tsttc, tmp_path: Path) -> None:
     counts = []
     for triples in ((), ("--half-open",)):

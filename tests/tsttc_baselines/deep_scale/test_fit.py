@@ -25,12 +25,14 @@ def pair(clip: Clip) -> tuple[tuple[Image, Image], tuple[Floats, Floats]]:
     return (clip.colour(0), clip.colour(5)), (clip.boxes[0], clip.boxes[5])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale_ratio", [0.7, 0.95, 1.17])
 def test_a_planted_scale_ratio_is_recovered_to_a_thousandth(scale_ratio: float) -> None:
     fitted = DeepScale(decoding="fit")(planted(scale_ratio), frame_gap=5).scale_ratio
     assert fitted == pytest.approx(scale_ratio, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_small_boxes_are_enlarged_and_their_scale_ratio_is_recovered() -> None:
     clip = planted(0.95, box_px=(30.0, 24.0), shift=(1.0, -0.6))
     assert DeepScale(decoding="fit")(clip, frame_gap=5).scale_ratio == pytest.approx(0.95, rel=5e-3)
@@ -47,6 +49,7 @@ def test_the_card_of_weights_says_how_they_are_decoded() -> None:
     assert auto == fit != head
 
 
+@pytest.mark.slow
 def test_boxes_that_lie_beside_the_vehicle_hardly_change_the_estimate(operations: Operations) -> None:
     frames, boxes = pair(planted(0.95))
     beside = box_around(centre_of(boxes[0]) + np.array([4.0, -3.0]), size_of(boxes[0]))
@@ -54,6 +57,7 @@ def test_boxes_that_lie_beside_the_vehicle_hardly_change_the_estimate(operations
     assert fitted == pytest.approx(0.95, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_without_texture_the_estimate_stays_at_a_start(operations: Operations) -> None:
     _, boxes = pair(planted(0.95))
     grey = np.full((240, 320, 3), 90, dtype=np.uint8)

@@ -42,6 +42,7 @@ def test_the_same_seed_and_sequence_give_the_same_bytes_in_any_order(drawn: Spli
     assert render(drawn, anno_id=0, seed=SEED + 1).jpegs != first[0].jpegs
 
 
+@pytest.mark.slow
 def test_boxes_lie_in_the_image_near_the_vehicle(drawn: Split) -> None:
     for row in range(0, 60, 6):
         rendered = render(drawn, anno_id=row, seed=SEED)

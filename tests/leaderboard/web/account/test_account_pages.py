@@ -45,6 +45,7 @@ def test_sign_up_tells_of_all_that_is_wrong_at_once_and_of_each_rule_once(client
     assert root.one("input", class_="show-password").attributes["type"] == "checkbox"
 
 
+@pytest.mark.slow
 def test_account_begins_with_what_it_has_and_leads_to_each_part(signed_in: Client, owner: User) -> None:
     builders.token(owner)
     root = pages.get(signed_in, "/account/")

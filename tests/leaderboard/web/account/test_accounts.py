@@ -25,6 +25,7 @@ def sign_in(user: User, password: str, *, address: str) -> bool:
 # --- who is locked out -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_wrong_passwords_from_one_address_lock_out_that_address_and_not_the_owner(owner: User) -> None:
     assert not any(sign_in(owner, "wrong", address=ATTACKER) for _ in range(12))
     assert not sign_in(owner, OLD_PASSWORD, address=ATTACKER)

@@ -67,6 +67,7 @@ WAYS: dict[str, list[tuple[str, dict[str, str] | None]]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_every_way_answers_the_same_for_a_free_and_a_taken_address(way: str) -> None:
     assert answers(TAKEN, *WAYS[way]) == answers(FREE, *WAYS[way])
@@ -98,6 +99,7 @@ def test_an_account_that_is_in_use_still_proves_its_address_at_the_sign_in(owner
     assert client.get("/submissions/").status_code == 200
 
 
+@pytest.mark.slow
 def test_adding_a_free_and_a_taken_address_answers_the_same() -> None:
     seen = []
     for number, email in enumerate((TAKEN, FREE)):

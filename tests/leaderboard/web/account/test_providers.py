@@ -99,6 +99,7 @@ def connected(user: User, *, number: str = "42", verified: bool = True) -> Socia
 # --- nothing where nothing is set ------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_without_a_client_nothing_is_shown_or_routed(client: Client, owner: User) -> None:
     assert "GitHub" not in client.get("/accounts/login/").text
     assert client.get("/accounts/login/").headers["Content-Security-Policy"].count("https://") == 0
@@ -120,6 +121,7 @@ def test_half_a_client_is_a_fault_of_the_settings(monkeypatch: pytest.MonkeyPatc
 # --- signing up and in -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_verified_address_makes_an_account_that_signs_in_again(provider: Provider, client: Client) -> None:
     page = client.get("/accounts/login/?next=/team/")
     assert_sound(page)
@@ -156,6 +158,7 @@ def test_a_verified_address_makes_an_account_that_signs_in_again(provider: Provi
     assert_sound(again.get("/accounts/password/set/"))
 
 
+@pytest.mark.slow
 def test_without_a_password_a_mailed_code_is_asked_for_before_providers_change(
     provider: Provider, owner: User
 ) -> None:
@@ -179,6 +182,7 @@ def test_without_a_password_a_mailed_code_is_asked_for_before_providers_change(
     assert SocialAccount.objects.filter(user=owner).count() == 2
 
 
+@pytest.mark.slow
 def test_orcid_tells_the_id_and_an_address_is_proved_by_mail(provider: Provider, client: Client) -> None:
     provider.orcid(emails=[("unproved@example.org", False, True)])
     assert arrive(client, "orcid").headers["Location"] == "/accounts/3rdparty/signup/"
@@ -240,6 +244,7 @@ def test_an_address_that_has_an_account_opens_nothing(
     assert owner.check_password(PASSWORD)
 
 
+@pytest.mark.slow
 def test_an_address_that_nobody_proved_here_is_its_owners(provider: Provider, client: Client) -> None:
     squatter = User.objects.create_user(NEW, PASSWORD)
     EmailAddress.objects.create(user=squatter, email=NEW, verified=False, primary=True)
@@ -267,6 +272,7 @@ def test_an_address_that_the_provider_has_not_verified_counts_for_nothing(
     assert not SocialAccount.objects.exists()
 
 
+@pytest.mark.slow
 def test_connecting_needs_a_sign_in_and_the_password_once_more(provider: Provider, owner: User) -> None:
     provider.github(emails=[(owner.email, True, True)])
     client = Client()
@@ -326,6 +332,7 @@ MALFORMED: tuple[tuple[str, str, Any], ...] = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "path", "answer"), MALFORMED, ids=[str(n) for n in range(len(MALFORMED))])
 def test_a_malformed_answer_ends_in_a_sentence(
     provider: Provider, db: None, name: str, path: str, answer: Any
@@ -336,6 +343,7 @@ def test_a_malformed_answer_ends_in_a_sentence(
     assert_refused(arrive(Client(), name), "was not understood")
 
 
+@pytest.mark.slow
 def test_a_provider_that_fails_or_hangs_ends_in_a_sentence(
     provider: Provider, db: None, settings: Settings
 ) -> None:
@@ -346,6 +354,7 @@ def test_a_provider_that_fails_or_hangs_ends_in_a_sentence(
     assert_refused(arrive(Client()), "GitHub did not answer in time.")
 
 
+@pytest.mark.slow
 def test_who_says_no_or_comes_from_nowhere_gets_a_reason(
     provider: Provider, client: Client, db: None
 ) -> None:

@@ -82,6 +82,7 @@ def set_up(client: Client, phone: Phone) -> list[str]:
     return re.findall(r"<li><code>(\d{8})</code></li>", codes.text)
 
 
+@pytest.mark.slow
 def test_who_has_an_app_needs_its_code_and_a_recovery_code_works_once(owner: User, phone: Phone) -> None:
     client = signed_in(owner)
     assert "Set up an authenticator app" in assert_sound(client.get("/accounts/2fa/")).text
@@ -108,6 +109,7 @@ def test_who_has_an_app_needs_its_code_and_a_recovery_code_works_once(owner: Use
         assert lost.post("/accounts/2fa/authenticate/", {"code": sent}).status_code == expected
 
 
+@pytest.mark.slow
 def test_the_code_that_set_up_the_app_signs_nobody_in(owner: User, phone: Phone) -> None:
     client = signed_in(owner)
     set_up(client, phone)
@@ -155,6 +157,7 @@ def test_guesses_of_codes_from_many_addresses_meet_the_limit_of_the_account(
     assert tries(owner, phone.code(), address=HOME)
 
 
+@pytest.mark.slow
 def test_codes_can_be_renewed_and_the_app_removed_after_the_password(
     owner: User, phone: Phone, django_capture_on_commit_callbacks: DjangoCaptureOnCommitCallbacks
 ) -> None:
@@ -303,6 +306,7 @@ def test_a_token_has_no_more_rights_than_a_session_without_a_code(
     assert client.post(f"/api/v1/submissions/{sent.pk}/withdraw").status_code == 404
 
 
+@pytest.mark.slow
 def test_other_people_need_no_code(owner: User, phone: Phone, settings: Settings) -> None:
     settings.REQUIRE_SECOND_FACTOR = True
     assert signed_in(owner).get("/maintain/").status_code == 404
@@ -318,6 +322,7 @@ def test_nobody_reads_or_writes_second_factors_in_the_administration(keeper: Use
         assert client.get(f"/admin/{model}/").status_code == 404
 
 
+@pytest.mark.slow
 def test_a_maintainer_who_signs_in_comes_to_what_waits_and_others_to_their_submissions(
     keeper: User, owner: User, phone: Phone
 ) -> None:
@@ -334,6 +339,7 @@ def test_a_maintainer_who_signs_in_comes_to_what_waits_and_others_to_their_submi
 # --- help, and a person's data ---------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_maintainer_resets_the_second_factor_of_another_with_a_reason(owner: User, phone: Phone) -> None:
     set_up(signed_in(owner), phone)
     call_command("reset_second_factor", owner.email, "--reason", "lost the phone", stdout=StringIO())
@@ -358,6 +364,7 @@ def test_what_cannot_be_reset_has_a_message(owner: User, email: str, reason: str
     assert not AuditEvent.objects.filter(verb="second factor reset").exists()
 
 
+@pytest.mark.slow
 def test_the_export_names_the_second_factor_without_its_key_and_forgetting_deletes_it(
     owner: User, phone: Phone
 ) -> None:

@@ -65,6 +65,7 @@ def test_with_a_mail_server_addresses_are_proved_by_a_code(production: dict[str,
 # --- an address that a user adds to their account ---------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_an_address_that_another_account_added_is_free_for_its_owner(attacker: Client) -> None:
     added = attacker.post("/accounts/email/", {"action_add": "", "email": VICTIM})
     assert added.headers["Location"] == CONFIRM
@@ -93,6 +94,7 @@ def test_an_address_that_another_account_added_is_free_for_its_owner(attacker: C
 # --- an account that a person signed up with it ----------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_an_account_that_nobody_confirmed_gives_way_to_the_owners(attacker: Client) -> None:
     squatter = Client()
     taken = sign_up(squatter, VICTIM, password=EVIL, name="Evil")
@@ -111,6 +113,7 @@ def test_an_account_that_nobody_confirmed_gives_way_to_the_owners(attacker: Clie
     assert squatter.get("/submissions/").status_code == 302
 
 
+@pytest.mark.slow
 def test_who_is_displaced_before_proving_signs_up_once_more() -> None:
     victim = Client()
     sign_up(victim, VICTIM)
@@ -125,6 +128,7 @@ def test_who_is_displaced_before_proving_signs_up_once_more() -> None:
     assert signs_in(VICTIM, PASSWORD)
 
 
+@pytest.mark.slow
 def test_a_reset_password_opens_no_account_that_nobody_confirmed() -> None:
     """The person who made it may have another way in: an account elsewhere that is connected with it."""
     sign_up(Client(), VICTIM, password=EVIL)
@@ -137,6 +141,7 @@ def test_a_reset_password_opens_no_account_that_nobody_confirmed() -> None:
     assert not SocialAccount.objects.exists()
 
 
+@pytest.mark.slow
 def test_adding_an_address_that_another_signed_up_with_proves_it(attacker: Client) -> None:
     sign_up(Client(), VICTIM, password=EVIL)
     client = Client()
@@ -149,6 +154,7 @@ def test_adding_an_address_that_another_signed_up_with_proves_it(attacker: Clien
     assert signs_in(VICTIM, PASSWORD)
 
 
+@pytest.mark.slow
 def test_a_proved_address_stays_its_owners_and_the_answer_is_the_same() -> None:
     owner = Client()
     sign_up(owner, VICTIM)

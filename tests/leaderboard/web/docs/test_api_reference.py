@@ -67,6 +67,7 @@ def test_every_operation_of_the_schema_is_described(client: Client, benchmark: N
         assert "* " not in " ".join(cell.text for cell in page.all("td"))
 
 
+@pytest.mark.slow
 def test_every_field_and_parameter_is_on_the_page_with_its_description(
     client: Client, benchmark: None
 ) -> None:

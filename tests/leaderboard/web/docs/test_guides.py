@@ -81,6 +81,7 @@ def test_a_visitor_finds_the_empty_template_in_the_docs_and_a_way_on_from_a_miss
     assert {"/board/test/", "/board/val/"} <= {a.attributes["href"] for a in missing.all("a")}
 
 
+@pytest.mark.slow
 def test_no_code_of_the_documentation_has_a_hat_which_only_equations_set_over_its_letter(
     client: Client, benchmark: None
 ) -> None:
@@ -199,6 +200,7 @@ def test_where_no_part_has_all_words_those_with_some_are_shown() -> None:
     assert search.find("xyzzyq") == []
 
 
+@pytest.mark.slow
 def test_the_first_eight_words_of_a_search_count_however_they_are_joined() -> None:
     names = [f"quota{n}" for n in range(search.MAX_WORDS)]
     for joint in (" ", "-", "_"):
@@ -225,6 +227,7 @@ def test_a_search_too_many_at_once_is_refused_and_leaves_threads_for_others(
     assert client.get("/docs/search/?q=quota").status_code == 200
 
 
+@pytest.mark.slow
 def test_a_page_of_several_sections_lists_them_and_each_link_has_its_heading(
     client: Client, benchmark: None
 ) -> None:

@@ -37,6 +37,7 @@ def test_the_sitemap_names_public_pages_and_each_answers(
     assert [address for address in addresses if client.get(address).status_code != 200] == []
 
 
+@pytest.mark.slow
 def test_the_sitemap_names_no_private_anonymous_or_withdrawn_method(
     client: Client, edition: Edition, owner: User
 ) -> None:

@@ -5,6 +5,7 @@ import re
 from datetime import timedelta
 
 import msgspec
+import pytest
 from django.conf import settings
 from django.test import Client
 from django.utils import timezone
@@ -143,6 +144,7 @@ def test_a_private_method_leads_nowhere_on_it_not_even_for_its_own_team(
     assert b"Secret" not in Client().get("/").content
 
 
+@pytest.mark.slow
 def test_without_a_split_an_entry_or_with_one_entry_it_says_so(
     client: Client, edition: Edition, owner: User
 ) -> None:
@@ -173,6 +175,7 @@ def test_a_lead_of_rows_from_papers_is_not_known_to_be_significant(client: Clien
     )
 
 
+@pytest.mark.slow
 def test_the_lead_is_as_significant_as_the_rank_range_of_the_first_row_says(
     client: Client, edition: Edition, owner: User, open_values: None
 ) -> None:

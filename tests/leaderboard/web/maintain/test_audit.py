@@ -155,6 +155,7 @@ def test_events_have_names_and_links_and_the_words_of_people(
     }
 
 
+@pytest.mark.slow
 def test_an_evaluation_names_its_edition_and_why_its_file_was_rejected(
     keeper: Client, edition: Edition, owner: User
 ) -> None:

@@ -71,6 +71,7 @@ def test_an_account_is_counted_wherever_it_sends_from_and_no_other_with_it(
     assert signed_in(stranger).post("/tokens/", {}).status_code != 429
 
 
+@pytest.mark.slow
 def test_boards_answered_from_memory_are_not_counted_and_others_are(edition: Edition) -> None:
     visitor = Client(REMOTE_ADDR=ATTACKER)
     assert {visitor.get("/board/test/").status_code for _ in range(10)} == {200}
@@ -81,6 +82,7 @@ def test_boards_answered_from_memory_are_not_counted_and_others_are(edition: Edi
     assert visitor.get("/board/test/").status_code == 200
 
 
+@pytest.mark.slow
 def test_boards_as_of_a_time_have_a_rate_of_their_own_unless_answered_from_memory(edition: Edition) -> None:
     visitor = Client(REMOTE_ADDR=ATTACKER)
     moment, day = "/board/test/?at=2026-01-02T12:00:00Z", "/board/test/?at=2026-01-02"
@@ -122,6 +124,7 @@ def test_the_server_of_the_demo_leaves_it_to_the_site_to_refuse_a_large_file(
     assert int(most) > 2 * settings.MAX_PREDICTIONS_BYTES
 
 
+@pytest.mark.slow
 def test_monitoring_and_the_api_are_not_counted_as_pages(owner: User) -> None:
     client = client_of(owner)
     assert {Client().get("/healthz").status_code for _ in range(6)} == {200}

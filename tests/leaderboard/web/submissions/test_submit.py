@@ -50,6 +50,7 @@ def test_form_sent_after_the_session_ended_says_so_on_the_sign_in_page(
     assert not Submission.objects.exists()
 
 
+@pytest.mark.slow
 def test_good_file_leads_to_its_own_page(signed_in: Client, edition: Edition, owner: User) -> None:
     response = send(signed_in, builders.predictions(edition), description="Box ratio.")
     submission = Submission.objects.get()
@@ -59,6 +60,7 @@ def test_good_file_leads_to_its_own_page(signed_in: Client, edition: Edition, ow
     assert submission.method.description == "Box ratio."
 
 
+@pytest.mark.slow
 def test_same_file_again_leads_to_the_first_submission_and_says_so(
     signed_in: Client, edition: Edition
 ) -> None:
@@ -70,6 +72,7 @@ def test_same_file_again_leads_to_the_first_submission_and_says_so(
     )
 
 
+@pytest.mark.slow
 def test_own_teams_methods_are_offered_and_nobody_elses(
     signed_in: Client, edition: Edition, owner: User, stranger: User
 ) -> None:
@@ -79,6 +82,7 @@ def test_own_teams_methods_are_offered_and_nobody_elses(
     assert [option.attributes["value"] for option in offered] == ["Mine"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("visibility", "sentence"),
     [
@@ -164,6 +168,7 @@ def test_details_of_the_method_are_taken_with_the_file_in_words_of_people(
     assert (method.n_parameters, method.hardware) == (31_000_000, "one GPU")
 
 
+@pytest.mark.slow
 def test_a_script_that_follows_the_upload_gets_the_address_of_the_submission(
     signed_in: Client, edition: Edition
 ) -> None:
@@ -175,6 +180,7 @@ def test_a_script_that_follows_the_upload_gets_the_address_of_the_submission(
     assert response.json() == {"page": f"/submissions/{Submission.objects.get().pk}/"}
 
 
+@pytest.mark.slow
 def test_an_exhausted_quota_stands_at_the_split_before_and_after_the_file_is_sent(
     signed_in: Client, owner: User, edition: Edition
 ) -> None:
@@ -266,6 +272,7 @@ def test_a_file_with_a_warning_is_submitted_once_that_is_confirmed(
     assert Submission.objects.count() == 1
 
 
+@pytest.mark.slow
 def test_a_file_that_cannot_be_read_is_left_to_the_worker(
     signed_in: Client, edition: Edition, monkeypatch: pytest.MonkeyPatch
 ) -> None:
