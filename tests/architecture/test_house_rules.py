@@ -87,6 +87,7 @@ def without_circle(modules: dict[str, ast.Module]) -> list[str]:
     return list(TopologicalSorter(graph).static_order())
 
 
+@pytest.mark.slow
 def test_no_modules_import_each_other() -> None:
     modules = {
         ".".join(path.with_suffix("").parts).removesuffix(".__init__"): tree(path)

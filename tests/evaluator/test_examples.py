@@ -51,12 +51,14 @@ def test_a_frame_comes_straight_to_a_report(tmp_path: Path) -> None:
     assert values["rte_crucial"] == "5.00", "five percent too long, where nothing is truncated"
 
 
+@pytest.mark.slow
 def test_ratios_at_every_gap_score_the_same(tmp_path: Path) -> None:
     lines = printed(EXAMPLES / "from_scale_ratios.py", tmp_path)
     assert len(lines) == 5
     assert len({line.partition(": ")[2] for line in lines}) == 1
 
 
+@pytest.mark.slow
 def test_toolkit_s_result_file_is_taken_as_it_is(tmp_path: Path) -> None:
     truth = read_truth(EXAMPLES / "truth.csv")
     predictions = read_predictions((EXAMPLES / "predictions.json").read_bytes(), manifest=truth.manifest)

@@ -40,6 +40,7 @@ def test_help_describes_the_functions() -> None:
     )
 
 
+@pytest.mark.slow
 def test_modules_of_the_baselines_are_attributes() -> None:
     assert output_of("import tsttc_baselines as b; print(b.pixel_mse.PixelMse.__name__)") == "PixelMse\n"
     with pytest.raises(AttributeError, match="no attribute 'absent'"):

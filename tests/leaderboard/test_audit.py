@@ -68,6 +68,7 @@ def test_each_sealed_event_is_bound_to_the_one_before_it(owner: User) -> None:
     assert (first, second, third) == (GENESIS, one, two)
 
 
+@pytest.mark.slow
 def test_events_written_together_are_sealed_in_their_order(db: None) -> None:
     sealed()
     audit.record_many(("scored", "Evaluation", number, {"attempt": 1}) for number in range(500))
@@ -352,6 +353,7 @@ def forge(event: AuditEvent, *, seal_number: int | None, previous_hash: str | No
         )
 
 
+@pytest.mark.slow
 @pytest.mark.django_db(transaction=True)
 @pytest.mark.parametrize(
     ("previous_hash", "hash_"),
@@ -381,6 +383,7 @@ def test_after_an_event_with_the_largest_number_sealing_goes_on_and_it_is_named(
     assert migrate_again() == ""
 
 
+@pytest.mark.slow
 @pytest.mark.django_db(transaction=True)
 def test_two_events_with_numbers_at_the_end_and_parts_of_seals_keep_no_event_from_being_sealed() -> None:
     tip = str(sealed(2).hash)
@@ -399,6 +402,7 @@ def test_two_events_with_numbers_at_the_end_and_parts_of_seals_keep_no_event_fro
     assert {each.event_id for each in verification.breaks} == {first.pk, second.pk}
 
 
+@pytest.mark.slow
 @pytest.mark.django_db(transaction=True)
 @pytest.mark.parametrize(
     "details",

@@ -83,12 +83,14 @@ def fault_of(folder: Path, change: str) -> faults.Fault:
     return next(fault for fault in faults.of_file("tiny.py", folder) if fault.change == change)
 
 
+@pytest.mark.slow
 def test_changed_comparison_runs_once_it_is_planted(tiny: ModuleType, tmp_path: Path) -> None:
     assert not tiny.is_below(1, 1)
     plant(fault_of(tmp_path, "a < b -> (a) <= (b)"), root=tmp_path)
     assert tiny.is_below(1, 1)
 
 
+@pytest.mark.slow
 def test_dropped_decorator_is_gone_wherever_the_function_is_used(tiny: ModuleType, tmp_path: Path) -> None:
     others = {"number": tiny.number}
     plant(fault_of(tmp_path, "@double -> (nothing)"), root=tmp_path)
@@ -105,6 +107,7 @@ def test_each_condition_of_a_query_can_be_dropped(tiny: ModuleType, tmp_path: Pa
     assert {"objects.filter(pk=2)", "objects.filter(team=1)"} <= changes
 
 
+@pytest.mark.slow
 def test_fault_in_a_module_that_nobody_imported_cannot_be_planted(tmp_path: Path) -> None:
     (tmp_path / "tiny.py").write_text(MODULE)
     with pytest.raises(NotPlantable):

@@ -31,6 +31,7 @@ VALUES = {"split": "test", "number": 1, "submission_id": ABSENT, "method_id": AB
 BLIND = {"api-revoke-token", "api-docs", "api-root", "^api(/|$)"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("header", MALFORMED)
 def test_no_address_asks_the_database_for_what_is_no_token(
     db: None, django_assert_num_queries: DjangoAssertNumQueries, header: str

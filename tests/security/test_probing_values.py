@@ -14,6 +14,7 @@ def error_s(name: str, decimals: probing_values.Decimals, *, n_sequences: int = 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RANGES)
 def test_decoder_reads_a_value_where_everything_is_published_and_none_where_nothing_is(name: str) -> None:
     assert error_s(name, {"rte": 2}) < 0.1 * error_s(name, {})
@@ -21,6 +22,7 @@ def test_decoder_reads_a_value_where_everything_is_published_and_none_where_noth
     assert error_s(name, {"rte": -6}) == pytest.approx(error_s(name, {}), rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_crucial_value_of_a_small_split_is_all_but_published() -> None:
     assert error_s("crucial", WAYS["RTE"]) < 0.1 * error_s("crucial", {})
     assert error_s("crucial", WAYS["RTE"], n_sequences=28_600) > 3 * error_s("crucial", WAYS["RTE"])

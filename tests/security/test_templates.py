@@ -47,6 +47,7 @@ TRUSTING = {
 }
 
 
+@pytest.mark.slow
 def test_no_code_takes_text_for_markup() -> None:
     trusting = re.compile(r"\bmark_safe\(|\bSafeText\(|__html__|autoescape=False")
     not_empty = re.compile(r"\bSafeString\((?!\"\"\)).*")

@@ -24,6 +24,7 @@ def test_a_planted_scale_ratio_is_recovered(scale_ratio: float) -> None:
     assert alpha(planted(scale_ratio)) == pytest.approx(scale_ratio, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame_gap", [1, 2, 3, 4])
 def test_any_frame_can_be_the_reference(frame_gap: int) -> None:
     assert alpha(planted(0.8), frame_gap) == pytest.approx(0.8 ** (frame_gap / 5), abs=1e-3)

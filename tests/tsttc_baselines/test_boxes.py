@@ -23,6 +23,7 @@ def test_expansion_keeps_the_centre_and_multiplies_both_sides(
     np.testing.assert_allclose(boxes.size_of(grown), boxes.size_of(box) * ratio)
 
 
+@pytest.mark.slow
 @given(x=coordinates, y=coordinates, width=sides, height=sides)
 def test_the_shared_expansion_keeps_both_boxes_within_the_image(
     x: float, y: float, width: float, height: float
@@ -45,6 +46,7 @@ def test_the_narrower_of_two_rooms_decides() -> None:
     assert boxes.shared_expansion(near_the_edge, [400, 200, 500, 300], **IMAGE) == pytest.approx(1.05)
 
 
+@pytest.mark.slow
 @given(scale=st.floats(0.5, 2))
 def test_every_measure_but_the_area_gives_the_scale_of_the_box(scale: float) -> None:
     target = np.array([100.0, 100, 180, 160])

@@ -33,6 +33,7 @@ def side(box: np.ndarray) -> float:
     return float(np.sqrt(np.prod(box[2:] - box[:2])))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale_ratio", [0.7, 0.9, 1.2])
 def test_scale_ratio_is_that_of_the_boxes_whatever_is_mirrored_reversed_or_resized(
     scale_ratio: float,
@@ -49,6 +50,7 @@ def test_scale_ratio_is_that_of_the_boxes_whatever_is_mirrored_reversed_or_resiz
         assert 0.005 < np.std(each) < 0.03
 
 
+@pytest.mark.slow
 def test_a_quarter_is_reversed_a_half_mirrored_and_a_third_resized_by_at_most_six_hundredths() -> None:
     changed = list(all_of(pair(0.8)))
     is_reversed = [each.scale_ratio > 1 for each in changed]
@@ -64,6 +66,7 @@ def test_a_quarter_is_reversed_a_half_mirrored_and_a_third_resized_by_at_most_si
     assert min(growths) < 1 < max(growths)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale_ratio", [0.655, 1.49])
 def test_no_pair_says_what_no_bin_can(scale_ratio: float) -> None:
     ratios = [each.scale_ratio for each in all_of(pair(scale_ratio))]
@@ -92,6 +95,7 @@ def test_a_mirrored_box_is_over_the_same_pixels() -> None:
         assert (inside > 150).sum() > 0.75 * n_bright
 
 
+@pytest.mark.slow
 def test_colours_of_both_frames_change_alike_and_by_little() -> None:
     grey = np.full((HEIGHT, WIDTH, 3), (90, 120, 150), dtype=np.uint8)
     original = Pair(grey, grey, pair(0.9).boxes, 0.9)

@@ -60,6 +60,7 @@ def test_the_coarse_search_ends_at_the_bins_of_the_full_one() -> None:
     assert len(fine.scales) < len(full.scales) / 5
 
 
+@pytest.mark.slow
 def test_the_toolkits_variant_finds_approaching_objects_and_loses_receding_ones() -> None:
     variant = PixelMse(variant="toolkit")
     approaching, receding = (

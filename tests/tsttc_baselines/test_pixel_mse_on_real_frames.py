@@ -38,6 +38,7 @@ def with_loose_boxes(real: Real) -> Real:
     ], truth
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", SEARCHES)
 def test_the_papers_variant_reaches_its_errors_on_real_frames(real_clips: Real, search: str) -> None:
     estimates = ratios(real_clips[0], PixelMse(search=search))
@@ -50,6 +51,7 @@ def test_the_toolkits_variant_is_worse_as_it_should_be(real_clips: Real) -> None
     assert 19 <= mid(real_clips, PixelMse(variant="toolkit")) <= 30
 
 
+@pytest.mark.slow
 def test_shifts_halve_the_error_where_boxes_are_loose(real_clips: Real) -> None:
     loose = with_loose_boxes(real_clips)
     assert mid(loose, PixelMse(shift=0)) >= 2 * mid(loose, PixelMse(shift=3))
@@ -61,5 +63,6 @@ def test_the_error_falls_with_every_frame_of_gap(real_clips: Real) -> None:
     assert all(wider < narrower for narrower, wider in itertools.pairwise(errors))
 
 
+@pytest.mark.slow
 def test_more_bins_are_not_worse(real_clips: Real) -> None:
     assert mid(real_clips, PixelMse(bins=125)) <= 1.05 * mid(real_clips, PixelMse(bins=25))

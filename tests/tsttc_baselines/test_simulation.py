@@ -26,6 +26,7 @@ def test_a_split_has_the_shares_of_the_dataset_to_the_sequence(drawn: Split) -> 
     assert drawn.truth.manifest.n_recordings == 50
 
 
+@pytest.mark.slow
 def test_sequences_beyond_20_s_lie_in_no_range() -> None:
     drawn = split(rng=np.random.default_rng(1), n_sequences=500, n_recordings=9, shape=SHAPES["test"])
     assert drawn.truth.n_outside(TTC_RANGES) == 8

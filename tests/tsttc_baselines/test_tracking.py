@@ -113,6 +113,7 @@ def test_nano_track_follows_with_the_models_that_are_given(
         assert follow(clip, frame_gap=frame_gap).scale_ratio == pytest.approx(0.5**frame_gap)
 
 
+@pytest.mark.slow
 def test_the_error_on_real_frames_is_at_most_13_mid(real_clips: tuple[list[Clip], Floats]) -> None:
     clips, ttc_s = real_clips
     assert mean_mid([alpha(clip) for clip in clips], ttc_s) <= 13

@@ -18,6 +18,7 @@ from tests.journeys import recipes
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the jobs run on Linux")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("confirmed", "exit_code", "n_sent"), [("", 10, 0), ("false", 10, 0), ("true", 0, 1)]
 )

@@ -220,6 +220,7 @@ def test_token_is_no_option(tsttc: Tsttc) -> None:
         assert "--token" not in tsttc(command, "--help").stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("reply", "exit_code", "words"),
     [

@@ -50,6 +50,7 @@ def test_scalars_and_arrays_broadcast(metric: Metric) -> None:
     assert metric.errors(PREDICTED_S, 5.0).tolist() == metric.errors(PREDICTED_S, np.full(100, 5.0)).tolist()
 
 
+@pytest.mark.slow
 @every_metric
 @given(true_s=times, nearer=st.floats(0.01, 0.2), farther=st.floats(0.25, 0.9))
 def test_a_prediction_further_off_on_the_same_side_is_not_better(

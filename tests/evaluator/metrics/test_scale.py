@@ -24,12 +24,14 @@ def test_frame_gaps_are_the_rates_of_ten_hertz_video() -> None:
     assert fps_of_gap([1, 2, 3, 4, 5]).tolist() == [10.0, 5.0, 10 / 3, 2.5, 2.0]
 
 
+@pytest.mark.slow
 @given(ttc_s=times, fps_hz=rates)
 def test_scale_ratio_and_ttc_are_inverse(ttc_s: float, fps_hz: float) -> None:
     ratio = ttc_to_scale_ratio(ttc_s, fps_hz=fps_hz)
     assert float(scale_ratio_to_ttc(ratio, fps_hz=fps_hz)) == pytest.approx(ttc_s, rel=1e-9)
 
 
+@pytest.mark.slow
 @given(ttc_s=times.filter(lambda t: abs(t) < 200), from_fps_hz=rates, to_fps_hz=rates)
 def test_the_rate_changes_the_ratio_but_not_the_time(
     ttc_s: float, from_fps_hz: float, to_fps_hz: float

@@ -135,6 +135,7 @@ def test_tables_of_results_keep_numbers_texts_and_what_is_missing() -> None:
     assert written.to_pylist() == rows
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="the system does not list threads")
 def test_reading_a_table_starts_no_thread_that_could_abort_the_end_of_the_process(tmp_path: Path) -> None:
     path = tmp_path / "x.parquet"

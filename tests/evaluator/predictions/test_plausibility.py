@@ -117,6 +117,7 @@ def test_flipped_signs_are_seen_without_the_truth() -> None:
     assert "140 of 140 values rise; expected most of them to fall" in warning.message
 
 
+@pytest.mark.slow
 def test_submit_warns_before_it_sends_and_sends_what_is_confirmed(
     tsttc: Tsttc, site: RecordedSite, at_site: None, driven: GroundTruth, tmp_path: Path
 ) -> None:

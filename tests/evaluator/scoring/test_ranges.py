@@ -253,6 +253,7 @@ def test_who_lacks_a_value_has_no_range_and_is_in_nobodys() -> None:
     assert not nobody.high.any()
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     seed=st.integers(0, 10_000),

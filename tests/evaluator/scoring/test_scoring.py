@@ -94,6 +94,7 @@ near_zero = st.floats(-0.15, 0.05, exclude_min=True, exclude_max=True)
 elsewhere = (st.floats(0.05) | st.floats(max_value=-0.15)).filter(lambda value: not math.isnan(value))
 
 
+@pytest.mark.slow
 @given(predicted_s=st.lists(elsewhere, min_size=1, max_size=20))
 def test_all_protocols_agree_exactly_away_from_zero(predicted_s: list[float]) -> None:
     truth = make_truth(np.linspace(1, 19, len(predicted_s)))
@@ -104,6 +105,7 @@ def test_all_protocols_agree_exactly_away_from_zero(predicted_s: list[float]) ->
     assert board == toolkit == {name: warnings[name] for name in board}
 
 
+@pytest.mark.slow
 @given(predicted_s=st.lists(near_zero.filter(bool), min_size=1, max_size=20))
 def test_the_boards_protocol_always_has_a_finite_result(predicted_s: list[float]) -> None:
     truth = make_truth(np.linspace(1, 19, len(predicted_s)))

@@ -55,6 +55,7 @@ def test_the_interval_of_the_method_that_fails_is_the_worse_one(model: Model) ->
     assert simulated.shown.n == round(200 * simulated.share_shown)
 
 
+@pytest.mark.slow
 def test_ranges_hold_beside_papers_that_measured_on_the_same_recordings() -> None:
     """With the papers' values as exact, all ranges held in two thirds of the cases."""
     share = fields.all_hold_beside_sampled_papers(
@@ -85,6 +86,7 @@ def test_rank_ranges_hold_the_true_ranks(n_recordings: int, field: str) -> None:
     assert ranks.all_at_once >= 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_methods", [5, 10])
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
 def test_all_rank_ranges_hold_at_once_beside_a_quoted_row(n_methods: int, correlation: float) -> None:

@@ -56,6 +56,7 @@ def test_pickle_that_takes_all_memory_is_refused_without_limits_too(
     assert problem_of(tmp_path) == ("too-large", tmp_path.name, message)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("has_limits", [True, False])
 def test_a_folder_reads_the_same_in_a_child_and_without(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_limits: bool
@@ -95,6 +96,7 @@ def at_the_second_file(monkeypatch: pytest.MonkeyPatch, action: Callable[[int], 
     monkeypatch.setattr(annotation_folders, "_contents", contents)
 
 
+@pytest.mark.slow
 def test_child_that_dies_is_a_problem_of_the_file_that_it_was_at(
     three: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -134,6 +136,7 @@ def test_child_has_no_secrets_and_may_open_nothing(three: Path, monkeypatch: pyt
     assert not children()
 
 
+@pytest.mark.slow
 def test_child_that_does_not_start_blames_no_file(three: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(annotation_folders, "_BASE_BYTES", 1 << 70)
     monkeypatch.setattr(annotation_folders, "_BYTES_PER_BYTE", 0)

@@ -119,6 +119,7 @@ def messages(data: bytes, folder: Path) -> list[str]:
     return [f"{problem.code}: {problem.message}" for problem in rejected.value.problems]
 
 
+@pytest.mark.slow
 def test_results_of_another_folder_are_refused_with_both_numbers(folder: Path) -> None:
     assert messages(flat({str(i): 1.0 for i in range(326)}), folder) == [
         "missing-keys: The file has 326 anno_ids and the folder 327 sequences; no value for 1 of the "
@@ -130,6 +131,7 @@ def test_results_of_another_folder_are_refused_with_both_numbers(folder: Path) -
     ]
 
 
+@pytest.mark.slow
 def test_natural_keys_are_not_converted_again(folder: Path, results: Path) -> None:
     once = convert(results.read_bytes(), natural_keys=read_numbering(folder).natural_keys)
     assert messages(once, folder) == [

@@ -230,6 +230,7 @@ def test_no_bytes_raise_anything_but_a_rejection(data: bytes) -> None:
         assert faults(data) <= {"bad-annotations", "forbidden-pickle"}
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(
     at=st.integers(0, 400),

@@ -294,6 +294,7 @@ def test_a_changed_file_is_refused(
     assert rejection(repacked(path, **changes)).problems[0].code == code
 
 
+@pytest.mark.slow
 @settings(max_examples=100)
 @given(at=st.integers(0, 3_000), n_removed=st.integers(0, 30), piece=st.binary(max_size=8))
 def test_a_damaged_file_raises_nothing_but_a_rejection(

@@ -56,6 +56,7 @@ def test_nobody_waits_for_ever(client: APIClient, entries: list[Submission]) -> 
     assert look(client, entries[0])["awaits_intervals"] is False
 
 
+@pytest.mark.slow
 def test_private_one_has_intervals_no_range_and_the_rank_that_it_would_have(
     client: APIClient, entries: list[Submission], edition: Edition, owner: User
 ) -> None:

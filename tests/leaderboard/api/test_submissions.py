@@ -146,6 +146,7 @@ def test_the_same_bytes_are_answered_with_the_first_submission_when_nothing_more
     assert Submission.objects.count() == 1
 
 
+@pytest.mark.slow
 def test_a_closed_split_answers_only_the_team_and_method_that_sent_the_file_there(
     edition: Edition, owner: User, stranger: User, tmp_path: Path
 ) -> None:

@@ -108,6 +108,7 @@ def test_the_index_loads_nothing_from_other_hosts(methods: dict[str, Submission]
     assert b"url(" not in files["site.css"] + files["index.css"]
 
 
+@pytest.mark.slow
 def test_a_row_of_the_index_says_its_team_and_date_and_links_its_sources(
     benchmark: None, methods: dict[str, Submission], tmp_path: Path
 ) -> None:

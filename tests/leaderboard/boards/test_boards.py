@@ -96,6 +96,7 @@ def test_private_method_is_seen_by_its_team_alone_and_takes_nobodys_rank(
         assert others == list(without.entries)
 
 
+@pytest.mark.slow
 def test_every_column_sorts_and_ranks_do_not_change(edition: Edition, owner: User) -> None:
     builders.submit(owner, builders.predictions(edition))
     builders.score_all()

@@ -51,6 +51,7 @@ def test_ranks_of_another_edition_and_boards_of_the_past_have_not_moved(months: 
     assert movement.moved(board_of(), now=timezone.now()) == {}
 
 
+@pytest.mark.slow
 def test_page_tells_what_is_new_and_what_has_moved(months: list[Method], client: Client) -> None:
     root = pages.get(client)
     new = [

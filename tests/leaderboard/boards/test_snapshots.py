@@ -91,6 +91,7 @@ def test_the_order_in_which_rows_lie_changes_no_byte(
 # --- it is never old ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_every_change_is_seen_by_the_very_next_reader(edition: Edition, owner: User, client: Client) -> None:
     def rows() -> int:
         return len([e for e in client.get(API).json()["entries"] if e["kind"] == "submission"])

@@ -93,6 +93,7 @@ def test_a_file_without_its_kept_values_is_read_again_beside_the_batch(
     assert_all_scored_once(edition)
 
 
+@pytest.mark.slow
 def test_kept_values_that_were_changed_are_not_scored(edition: Edition) -> None:
     truth = truth_values.load(edition.ground_truth_id)
     digest = evaluator.read_predictions(crowd.contents(truth, 3), manifest=truth.manifest).digest

@@ -91,6 +91,7 @@ def test_only_a_draft_has_a_rate_and_a_time_that_is_left(
     assert None not in (draft.rate_per_s, draft.left_s)
 
 
+@pytest.mark.slow
 def test_publishing_flips_the_board_and_rolling_back_returns_it_as_it_was(
     entries: list[Submission], tmp_path: Path, client
 ) -> None:
@@ -195,6 +196,7 @@ def test_publishing_again_queues_what_came_since(
     assert "Late" in {entry.method for entry in board_now().entries}
 
 
+@pytest.mark.slow
 def test_an_edition_opened_again_gets_what_is_sent_until_it_is_published(
     entries: list[Submission], owner: User, edition: Edition, tmp_path: Path
 ) -> None:
@@ -214,6 +216,7 @@ def test_an_edition_opened_again_gets_what_is_sent_until_it_is_published(
     assert "Between" in {entry.method for entry in board_now().entries}
 
 
+@pytest.mark.slow
 def test_an_edition_opened_again_and_closed_again_gets_nothing_more_and_can_be_published(
     entries: list[Submission], owner: User, edition: Edition, tmp_path: Path
 ) -> None:

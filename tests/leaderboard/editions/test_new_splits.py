@@ -100,6 +100,7 @@ def test_a_challenge_shares_ground_truth_and_has_its_own_deadline_quota_and_boar
     assert (same_truth_as["challenge"], same_truth_as["test"]) == ("test", None)
 
 
+@pytest.mark.slow
 def test_a_corrected_board_leaves_a_challenge_on_the_same_truth_as_it_is_until_it_is_corrected_too(
     challenge: Split, edition: Edition, owner: User, tmp_path: Path, client: Client
 ) -> None:
@@ -123,6 +124,7 @@ def test_a_corrected_board_leaves_a_challenge_on_the_same_truth_as_it_is_until_i
     assert own_score(before) != own_score(values[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("origin", ["hidden", "as test"])
 def test_new_split_on_hidden_values_starts_off_the_pages_with_the_quota_of_the_test_split(
     keeper: Client, edition: Edition, origin: str
@@ -168,6 +170,7 @@ def own_score(board: dict[str, Any]) -> float:
     return value
 
 
+@pytest.mark.slow
 def test_page_adds_a_challenge_and_says_what_is_wrong_at_the_field(keeper: Client, edition: Edition) -> None:
     last = max(Split.objects.values_list("position", flat=True))
     assert filled_in(assert_sound(keeper.get(ADD)))["position"] == str(last + 1)
@@ -263,6 +266,7 @@ def as_typed(values: dict[str, Any]) -> dict[str, str]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("values", "questions"), DOUBTFUL)
 @pytest.mark.parametrize("name", ["test", "val"])
 def test_a_date_of_another_year_is_asked_about_and_nothing_is_changed_before_the_answer(
@@ -316,6 +320,7 @@ def test_a_new_split_and_the_announcement_of_the_site_ask_as_well(keeper: Client
     assert PageVersion.announcement().count() == 1
 
 
+@pytest.mark.slow
 def test_the_end_of_one_split_leaves_the_other_open(
     keeper: Client, edition: Edition, owner: User, tmp_path: Path
 ) -> None:

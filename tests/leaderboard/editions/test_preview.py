@@ -53,6 +53,7 @@ def test_preview_says_what_becomes_rejected_and_why(entries: list[Submission], t
         assert change.rank_change > 0
 
 
+@pytest.mark.slow
 def test_what_is_rejected_in_both_editions_is_not_changed(
     entries: list[Submission], edition: Edition, owner: User
 ) -> None:

@@ -167,6 +167,7 @@ def test_a_document_that_is_none_is_refused_in_words(change: dict[str, Any], sen
     assert PublishedResult.objects.count() == n_before
 
 
+@pytest.mark.slow
 def test_the_page_imports_a_paper_with_missing_values_and_says_where_every_problem_is(
     keeper: Client, edition: Edition
 ) -> None:

@@ -110,6 +110,7 @@ def forget_kept_values(sent: dict[Submission, ValuesByKey]) -> None:
         files.store().delete(files.aligned_name(manifest_digest=manifest, digest=digest))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["from kept values", "from the files"])
 def test_scores_change_exactly_as_an_offline_score_by_natural_keys_says(
     sent: dict[Submission, ValuesByKey], tmp_path: Path, way: str
@@ -141,6 +142,7 @@ def test_scores_change_exactly_as_an_offline_score_by_natural_keys_says(
     assert (truth.n_added, truth.n_removed, truth.n_changed, truth.n_renumbered) == (3, 0, 0, 120)
 
 
+@pytest.mark.slow
 def test_the_same_bytes_for_two_manifests_are_two_submissions_that_are_never_mixed_up(
     sent: dict[Submission, ValuesByKey], owner: User, tmp_path: Path
 ) -> None:

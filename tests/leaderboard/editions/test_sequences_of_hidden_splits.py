@@ -71,6 +71,7 @@ def test_an_open_split_takes_no_sequence_of_a_hidden_one(hidden: Edition, tmp_pa
     assert after == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", ["marked as open", "its rows deleted too"])
 def test_a_database_that_calls_a_hidden_split_open_gets_no_labels_with_the_next_correction(
     hidden: Edition, owner: User, tmp_path: Path, change: str
@@ -105,6 +106,7 @@ def test_a_correction_of_a_hidden_split_and_all_that_share_a_sequence_are_marked
     assert not hidden_marks.is_marked(open_one.ground_truth_id)
 
 
+@pytest.mark.slow
 def test_workers_follow_the_mark_of_shared_sequences_and_not_the_database(
     hidden: Edition, owner: User, tmp_path: Path
 ) -> None:
@@ -134,6 +136,7 @@ def test_workers_follow_the_mark_of_shared_sequences_and_not_the_database(
     assert analyses.for_submission(submission=sent, viewer=owner) is None
 
 
+@pytest.mark.slow
 def test_a_hidden_ground_truth_gets_no_finer_metric_on_a_split_that_the_database_calls_open(
     hidden: Edition, owner: User
 ) -> None:

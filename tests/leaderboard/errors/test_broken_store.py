@@ -92,6 +92,7 @@ def test_an_upload_to_a_broken_store_gets_503_on_page_and_api_and_leaves_no_row(
     assert api.post("/api/v1/submissions", _form(data)).status_code == 201
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("breaking", [_not_a_folder, _circle])
 def test_a_store_that_is_no_folder_gets_503(
     edition: Edition, owner: User, settings: Settings, breaking: Break
@@ -104,6 +105,7 @@ def test_a_store_that_is_no_folder_gets_503(
     assert not Submission.objects.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.django_db(transaction=True)
 @pytest.mark.parametrize("breaking", [_not_a_folder, _not_mounted, None])
 def test_whatever_reads_from_a_broken_store_gets_503(

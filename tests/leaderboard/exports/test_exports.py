@@ -69,6 +69,7 @@ def _number(text: str) -> str:
 # --- the same as the page ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("query", ["", "?sort=-rte_large", "?q=scale&sort=method", "?code=yes"])
 def test_every_form_has_the_page_s_rows_in_its_order_with_its_numbers(
     edition: Edition, owner: User, client: Client, query: str

@@ -112,6 +112,7 @@ OF_THE_SERVER = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("answer", OF_THE_SERVER)
 @pytest.mark.parametrize("step", ["recipient_answer", "text_answer"])
 def test_a_refusal_of_every_mail_ends_none_and_is_shown_until_the_server_takes_one(
@@ -174,6 +175,7 @@ def test_a_refusal_that_may_be_of_all_ends_two_mails_once_another_is_taken(
     assert outbox.waiting() == 0
 
 
+@pytest.mark.slow
 def test_one_recipient_whose_refusal_may_be_of_all_is_no_fault_of_the_server(
     server: smtp_server.Server, settings: Settings
 ) -> None:

@@ -131,6 +131,7 @@ def test_what_a_maintainer_deletes_is_red_where_it_is_offered_and_asked(
     assert "class" not in get(keeper, rename).one("main").one("button").attributes
 
 
+@pytest.mark.slow
 def test_a_hidden_entry_leaves_boards_of_all_times_and_a_withdrawn_one_its_values(
     keeper: Client, edition: Edition, owner: User
 ) -> None:
@@ -163,6 +164,7 @@ def test_a_withdrawal_is_offered_where_there_are_scores_to_remove(
     assert f"/maintain/actions/hide/{rejected.pk}/" in links
 
 
+@pytest.mark.slow
 def test_a_method_moves_to_another_team_with_its_submissions(
     keeper: Client, edition: Edition, owner: User, stranger: User
 ) -> None:
@@ -229,6 +231,7 @@ def everything() -> str:
     return "".join(serializers.serialize("json", model._base_manager.all()) for model in tables)
 
 
+@pytest.mark.slow
 def test_a_forgotten_person_is_named_nowhere_and_their_scores_stay(
     edition: Edition, owner: User, keeper: Client
 ) -> None:
@@ -276,6 +279,7 @@ def test_a_team_goes_on_without_its_owner(team: Team, owner: User, teammate: Use
     assert Membership.objects.get(team=team, is_owner=True).user == teammate
 
 
+@pytest.mark.slow
 def test_the_account_page_exports_and_deletes(signed_in: Client, edition: Edition, owner: User) -> None:
     published(edition, owner)
     answer = signed_in.get("/account/data.json")

@@ -177,6 +177,7 @@ def test_the_owner_who_throws_the_thief_out_is_not_thrown_out_by_a_link(victim: 
     assert addresses_of(victim) == ["owner@example.org", "second@example.org"]
 
 
+@pytest.mark.slow
 def test_what_was_given_up_more_than_a_week_ago_comes_back_to_nobody(victim: User) -> None:
     client = thief(victim)
     add(client, "new@example.org")
@@ -208,6 +209,7 @@ def test_steps_days_apart_are_undone_together(victim: User) -> None:
     assert EVIL not in addresses_of(victim)
 
 
+@pytest.mark.slow
 def test_one_may_choose_from_which_change_on(victim: User) -> None:
     client = thief(victim)
     add(client, "new@example.org")
@@ -220,6 +222,7 @@ def test_one_may_choose_from_which_change_on(victim: User) -> None:
     assert addresses_of(victim) == ["owner@example.org", "second@example.org", "new@example.org"]
 
 
+@pytest.mark.slow
 def test_an_owner_who_has_another_account_by_now_reads_so(victim: User) -> None:
     client = thief(victim)
     take_over(client, victim)
@@ -264,6 +267,7 @@ def test_links_that_are_none_say_so(secret: str) -> None:
 # --- what a maintainer does ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_maintainer_gives_an_account_back_and_confirms_who_they_are(victim: User, maintainer: User) -> None:
     client = thief(victim)
     take_over(client, victim)
@@ -340,6 +344,7 @@ def test_a_changed_hand_gives_no_new_quota(victim: User, edition: Edition, maint
 # --- what is left ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_nothing_holds_the_addresses_of_a_deleted_person(victim: User, stranger: User) -> None:
     client = thief(victim)
     add(client, "new@example.org")

@@ -344,6 +344,7 @@ def test_the_alarm_fires_once_its_fault_is_there(
     assert fires(RULES[alert], before=before, now=scrape())
 
 
+@pytest.mark.slow
 @pytest.mark.django_db(transaction=True)
 @pytest.mark.parametrize(
     ("alert", "spoil"),

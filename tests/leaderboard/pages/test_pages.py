@@ -27,6 +27,7 @@ def shown(client: Client, name: str = "rules") -> str:
     return assert_sound(client.get(f"/{name}/")).one("main").text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", texts.PAGES)
 def test_every_page_has_a_text_from_the_start_and_is_linked_from_every_page(
     client: Client, benchmark: None, name: str

@@ -135,6 +135,7 @@ def test_sign_up_makes_one_account_of_all_spellings(settings: Settings) -> None:
     assert not User.objects.exclude(email__regex=r"^probe(\+[a-z0-9.+]*)?@example\.org$").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.django_db
 def test_who_signed_up_in_one_spelling_signs_in_and_resets_the_password_in_another(
     settings: Settings,
@@ -166,6 +167,7 @@ def test_an_added_address_has_the_one_spelling_or_is_refused(settings: Settings)
     assert set(EmailAddress.objects.values_list("email", flat=True)) == {OWN, "ada@xn--bcher-kva.example"}
 
 
+@pytest.mark.slow
 @pytest.mark.django_db
 def test_mails_that_anybody_can_ask_for_are_limited_for_the_mailbox(settings: Settings) -> None:
     proving.proving(settings)

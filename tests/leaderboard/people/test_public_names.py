@@ -152,6 +152,7 @@ def migrate_with(names: Sequence[str]) -> tuple[list[Team], list[Method], str]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.django_db(transaction=True)
 def test_of_names_that_look_alike_already_the_later_ones_are_exempt_until_they_are_renamed(
     maintainer: User, owner: User
@@ -208,6 +209,7 @@ def test_names_with_badges_from_before_they_stopped_to_count_are_exempt_too(
     assert [(each.row.name, each.twin) for each in public_names.exempt()] == [("Owls ★", "Owls")]
 
 
+@pytest.mark.slow
 @pytest.mark.django_db(transaction=True)
 def test_an_exempt_name_stays_taken_when_the_first_one_is_renamed(
     maintainer: User, owner: User, stranger: User

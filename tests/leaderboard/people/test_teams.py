@@ -209,6 +209,7 @@ def test_a_team_without_people_and_methods_is_forgotten_and_one_with_methods_sta
 # --- the page ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_page_founds_renames_hands_over_removes_and_leaves(
     client: Client, owner: User, teammate: User, stranger: User, team: Team
 ) -> None:

@@ -18,6 +18,7 @@ from leaderboard.submissions.progress import progress_of
 from tests import builders
 
 
+@pytest.mark.slow
 def test_scores_are_the_evaluators_own_with_the_editions_decimals(edition: Edition, owner: User) -> None:
     data = builders.predictions(edition, factor=1.3)
     submission = builders.submit(owner, data)

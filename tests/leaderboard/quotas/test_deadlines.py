@@ -34,6 +34,7 @@ def set_times(kind: str) -> str:
     return f"Submissions to Test {verb} at {at:%Y-%m-%d %H:%M} UTC."
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [LATE, FUTURE, ENDING])
 def test_board_form_quota_and_api_say_when(edition: Edition, owner: User, client: Client, kind: str) -> None:
     sentence = set_times(kind)
@@ -68,6 +69,7 @@ def test_board_form_quota_and_api_say_when(edition: Edition, owner: User, client
     assert (quota["next_slot_at"] is not None) is (kind == FUTURE)
 
 
+@pytest.mark.slow
 def test_kept_answers_hear_of_a_time_that_has_come(edition: Edition, client: Client) -> None:
     opens_at = timezone.now() + HOUR
     Split.objects.filter(pk="test").update(opens_at=opens_at, closes_at=opens_at + HOUR)

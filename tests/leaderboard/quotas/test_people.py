@@ -62,6 +62,7 @@ def shipped(edition: Edition) -> Edition:
     return edition
 
 
+@pytest.mark.slow
 def test_joining_pools_no_slots_and_shortens_no_gap_and_leaving_resets_nothing(
     shipped: Edition, owner: User, stranger: User
 ) -> None:
@@ -132,6 +133,7 @@ def test_accounts_of_one_mailbox_spend_one_quota_whatever_teams_they_are_in(
     assert (state(stranger).used, state(stranger).left) == (3, 0)
 
 
+@pytest.mark.slow
 def test_where_addresses_are_not_proved_nobody_spends_the_quota_of_another(
     limited: Edition, owner: User
 ) -> None:

@@ -76,6 +76,7 @@ def test_the_three_splits_have_their_quotas_from_the_start(db: None) -> None:
 # --- what costs, and until when --------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_one_more_than_the_limit_is_refused_until_the_oldest_leaves_the_window(
     edition: Edition, owner: User
 ) -> None:
@@ -140,6 +141,7 @@ def test_a_scored_submission_costs_its_slot_even_if_it_is_withdrawn(edition: Edi
 # --- what is given back ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_cancelling_gives_no_end_of_files_that_are_kept(edition: Edition, owner: User) -> None:
     limit(limit=1, rejected_limit=3)
     for number in range(3):
@@ -196,6 +198,7 @@ def test_rejected_files_have_a_limit_of_their_own(edition: Edition, owner: User)
 # --- without quota, and with another one -----------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_split_without_limits_takes_any_number(edition: Edition, owner: User) -> None:
     for number in range(5):
         send(owner, other(edition, number))

@@ -177,6 +177,7 @@ def test_hung_child_is_ended_when_the_lease_is(read: Read) -> None:
     assert not children()
 
 
+@pytest.mark.slow
 def test_each_file_has_a_child_of_its_own_and_all_have_one_server(read: Read) -> None:
     seen: list[tuple[int, set[int]]] = []
     for _ in range(3):

@@ -163,6 +163,7 @@ def changed(change: str) -> bytes:
     return TRUTHFUL.replace(b"CHANGE", change.encode())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_forked", [True, False])
 def test_an_answer_as_an_honest_reader_gives_it_is_taken(
     read: Read, settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_forked: bool

@@ -89,6 +89,7 @@ def test_the_worker_computes_what_the_evaluator_says_offline(
         assert difference == offline[name], name
 
 
+@pytest.mark.slow
 def test_the_same_pair_the_other_way_round_is_the_same_comparison(entries: list[Submission]) -> None:
     ask(*entries[:2])
     builders.infer_all()
@@ -139,6 +140,7 @@ def test_unknown_and_invisible_methods_look_alike_to_everybody(
     assert len(ask(entries[0], entries[1], viewer=owner).pairs) == 1
 
 
+@pytest.mark.slow
 def test_an_anonymous_method_is_compared_under_its_pseudonym(entries: list[Submission], owner: User) -> None:
     set_visibility(entries[0], Visibility.ANONYMOUS)
     ask(*entries[:2])

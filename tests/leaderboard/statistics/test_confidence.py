@@ -143,6 +143,7 @@ def kept(rows: list[tuple[object, ...]], score: Score) -> tuple[object, object]:
     return next((row[1], row[2]) for row in rows if row[0] == score.pk)
 
 
+@pytest.mark.slow
 def test_private_entries_get_an_interval_and_change_nothing_that_others_see(
     inferred: list[Submission], edition: Edition, stranger: User
 ) -> None:
@@ -239,6 +240,7 @@ def test_sums_that_are_gone_are_made_again_from_values_and_from_the_file(
     assert means == pytest.approx(list(builders.evaluator.evaluate(predictions, truth).flat().values()))
 
 
+@pytest.mark.slow
 def test_one_unreadable_file_keeps_no_other_interval_waiting(
     entries: list[Submission], edition: Edition, second: Edition
 ) -> None:

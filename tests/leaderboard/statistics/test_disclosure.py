@@ -158,6 +158,7 @@ def test_a_hidden_split_never_says_in_how_many_recordings_two_methods_differ() -
     )
 
 
+@pytest.mark.slow
 def test_nothing_finer_of_a_hidden_split_is_in_the_database(
     entries: list[Submission], edition: Edition, rival: Rival
 ) -> None:
@@ -171,6 +172,7 @@ def test_nothing_finer_of_a_hidden_split_is_in_the_database(
         assert difference["p"] is None
 
 
+@pytest.mark.slow
 def test_p_is_a_class_in_every_form(entries: list[Submission], rival: Rival, client: Client) -> None:
     other = rival(1.3)
     ask(entries[0], other)
@@ -324,6 +326,7 @@ def test_a_mark_withholds_what_is_not_public_or_of_one_team_where_the_database_s
     assert (why == "") is (is_published or not is_marked)
 
 
+@pytest.mark.slow
 @given(
     st.floats(-50, 50),
     st.floats(0, 9),

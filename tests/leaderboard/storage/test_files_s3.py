@@ -135,6 +135,7 @@ def test_absent_object_is_an_absent_file(stored: s3.S3FileStore) -> None:
 # --- when it is away ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_upload_while_the_store_is_away_is_answered_503_and_leaves_no_row(
     edition: Edition, owner: User, nobody_answers: None
 ) -> None:
@@ -153,6 +154,7 @@ def _fault_of_the_store(client: Client) -> tuple[bool, str]:
     return health.can_store(now=timezone.now()), " ".join([line.text, *line.reasons])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["away", "no bucket", "wrong key"])
 def test_the_check_of_a_bucket_names_its_fault_until_it_works_again(
     stored: s3.S3FileStore,

@@ -57,6 +57,7 @@ def test_a_moved_submission_keeps_its_slot_and_its_receipt(
     assert AuditEvent.objects.filter(verb="moved").count() == 1, "it is there already"
 
 
+@pytest.mark.slow
 def test_a_move_touches_one_file_of_one_split_and_one_team(
     edition: Edition, owner: User, stranger: User, tmp_path: Path
 ) -> None:
@@ -148,6 +149,7 @@ def test_withdrawn_or_hidden_submissions_and_other_teams_methods_stay(
     assert refused(mine, "Other", owner) == "not-movable"
 
 
+@pytest.mark.slow
 def test_page_and_api_move(client: Client, edition: Edition, owner: User, stranger: User) -> None:
     wrong, right = (
         sent(owner, edition, name, factor) for name, factor in (("Fromer", 1.1), ("TTC-Former", 1.2))

@@ -71,6 +71,7 @@ def test_one_edition_that_fails_hides_no_other_and_is_not_hidden_by_it(
     )
 
 
+@pytest.mark.slow
 def test_one_entry_that_fails_is_not_hidden_by_those_of_its_edition_that_work(
     edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:

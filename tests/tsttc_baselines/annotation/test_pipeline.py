@@ -36,6 +36,7 @@ def braking(n_tracks: int = 300) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return true_m + rng.normal(0, 0.05, true_m.shape), mps, -true_m / mps
 
 
+@pytest.mark.slow
 def test_the_choice_by_radar_has_at_most_0_7_of_the_error_of_ten_frames_when_a_vehicle_brakes() -> None:
     depth_m, mps, ttc_s = braking()
     rng = np.random.default_rng(6)

@@ -45,6 +45,7 @@ def test_a_folder_without_a_truth_needs_one(tsttc: Tsttc, frames: Path) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["svg", "png"])
 def test_a_sequence_is_drawn(tsttc: Tsttc, frames: Path, tmp_path: Path, suffix: str) -> None:
     figure = tmp_path / f"2.{suffix}"

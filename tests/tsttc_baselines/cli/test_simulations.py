@@ -70,6 +70,7 @@ def test_an_interrupted_rendering_continues_with_the_same_options_alone(tsttc: T
     assert untouched.stat().st_mtime_ns == before, "what was there is not rendered again"
 
 
+@pytest.mark.slow
 def test_simulate_and_render_draw_the_same_split(tsttc: Tsttc, tmp_path: Path) -> None:
     folder, truth, tracks = tmp_path / "frames", tmp_path / "truth.csv", tmp_path / "tracks.csv"
     assert tsttc("baseline", "simulate", truth, *SPLIT, "--tracks", tracks).exit_code == 0

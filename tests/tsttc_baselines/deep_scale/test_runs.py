@@ -27,6 +27,7 @@ def weights(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_run_names_its_weights(tsttc: Tsttc, folder: Path, weights: Path, tmp_path: Path) -> None:
     out = tmp_path / "p.json"
     result = tsttc("baseline", "run", "deep-scale", folder, "--out", out, "--weights", weights)

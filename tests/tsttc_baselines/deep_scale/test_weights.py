@@ -113,6 +113,7 @@ def zipped(entries: dict[str, bytes]) -> bytes:
     return buffer.getvalue()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTY)
 def test_a_faulty_checkpoint_is_a_problem_in_words(tmp_path: Path, fault: str) -> None:
     make, words = FAULTY[fault]

@@ -33,6 +33,7 @@ def test_the_area_rule_errs_as_in_the_published_row(drawn: Split) -> None:
         assert 45 <= relative[inside].mean() <= 75
 
 
+@pytest.mark.slow
 def test_the_same_seed_and_sequence_give_the_same_bytes_in_any_order(drawn: Split) -> None:
     first = [render(drawn, anno_id=row, seed=SEED) for row in (0, 7)]
     again = [render(drawn, anno_id=row, seed=SEED) for row in (7, 0)][::-1]

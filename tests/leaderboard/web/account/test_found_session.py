@@ -72,6 +72,7 @@ def test_every_door_asks_for_the_password(owner: User, benchmark: None, door: st
     assert not mail.outbox
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("door", [*DOORS, "password"])
 def test_every_door_asks_an_account_without_a_password_for_a_mailed_code(
     owner: User, benchmark: None, door: str
@@ -115,6 +116,7 @@ def test_the_interrupted_change_is_made_once_the_code_is_right(owner: User, benc
     assert ApiToken.objects.filter(user=owner).count() == 2
 
 
+@pytest.mark.slow
 def test_a_code_is_good_for_three_tries(owner: User) -> None:
     owner.set_unusable_password()
     owner.save()
@@ -130,6 +132,7 @@ def test_a_code_is_good_for_three_tries(owner: User) -> None:
     assert client.post(BY_CODE, {"code": again, "next": "/account/"}).status_code == 302
 
 
+@pytest.mark.slow
 def test_the_password_opens_the_doors_for_some_minutes(owner: User, benchmark: None) -> None:
     client = account(owner)
     confirm(client)
@@ -161,6 +164,7 @@ def test_a_found_session_hands_no_team_over(owner: User, teammate: User, benchma
     assert client.post(path, {"confirm": "on"}).status_code == 422
 
 
+@pytest.mark.slow
 def test_a_found_session_leaves_no_methods_to_nobody(owner: User, edition: Edition) -> None:
     builders.submit(owner, builders.predictions(edition))
     client = account(owner)

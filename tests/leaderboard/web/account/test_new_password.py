@@ -41,6 +41,7 @@ def test_a_wrong_old_password_revokes_nothing(signed_in: Client, two_tokens: Non
     assert n_working() == 2
 
 
+@pytest.mark.slow
 def test_after_a_reset_the_box_is_ticked(client: Client, owner: User, two_tokens: None) -> None:
     client.post("/accounts/password/reset/", {"email": owner.email})
     form = client.get(link_in(mail.outbox[-1], "/accounts/password/reset/key/"), follow=True)

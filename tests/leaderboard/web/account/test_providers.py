@@ -197,6 +197,7 @@ def test_orcid_tells_the_id_and_an_address_is_proved_by_mail(provider: Provider,
     assert not EmailAddress.objects.get().verified
 
 
+@pytest.mark.slow
 def test_another_address_than_the_verified_one_is_proved_by_mail(provider: Provider, client: Client) -> None:
     arrive(client)
     client.post("/accounts/3rdparty/signup/", {"email": "typed@example.org", "name": ""})

@@ -247,6 +247,7 @@ def test_maintainers_who_must_have_one_are_led_to_it_and_see_nothing_more_before
     assert Authenticator.objects.filter(user=keeper, type="totp").exists()
 
 
+@pytest.mark.slow
 def test_the_password_of_a_maintainer_alone_sets_up_no_app(keeper: User, settings: Settings) -> None:
     settings.REQUIRE_SECOND_FACTOR = True
     client = Client()
@@ -291,6 +292,7 @@ def test_forms_of_maintainers_and_of_the_set_up_do_nothing_in_such_a_session(
     assert not Authenticator.objects.exists()
 
 
+@pytest.mark.slow
 def test_a_token_has_no_more_rights_than_a_session_without_a_code(
     keeper: User, owner: User, edition: Edition, settings: Settings
 ) -> None:

@@ -14,6 +14,7 @@ from tests.leaderboard.web.test_every_page import assert_sound
 pytestmark = pytest.mark.usefixtures("benchmark")
 
 
+@pytest.mark.slow
 def test_the_page_has_every_value_and_marks_the_defaults(client: Client) -> None:
     answer = client.get("/published/")
     root = assert_sound(answer)

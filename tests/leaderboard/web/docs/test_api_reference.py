@@ -86,6 +86,7 @@ def test_every_field_and_parameter_is_on_the_page_with_its_description(
     assert undescribed == []
 
 
+@pytest.mark.slow
 def test_every_code_has_an_anchor_that_errors_lead_to(client: Client, benchmark: None) -> None:
     ids = {e.attributes["id"] for e in get(client).everything() if "id" in e.attributes}
     assert {f"problem-{code}" for code in (*API_CODES, *PROBLEM_CODES)} <= ids

@@ -18,6 +18,7 @@ def test_every_guide_is_a_sound_page(client: Client, benchmark: None) -> None:
         assert root.one("h1").text == guides.guide(name).title
 
 
+@pytest.mark.slow
 def test_every_page_of_the_documentation_has_the_navigation_and_marks_where_one_is(
     client: Client, benchmark: None
 ) -> None:
@@ -60,6 +61,7 @@ def test_the_address_of_a_guide_without_its_slash_leads_to_it_and_others_are_404
         assert client.get(f"/docs/{name}/").status_code == 404
 
 
+@pytest.mark.slow
 def test_a_guide_asks_the_database_for_nothing_and_is_compressed(
     client: Client, django_assert_num_queries: DjangoAssertNumQueries, db: None
 ) -> None:
@@ -92,6 +94,7 @@ def test_no_code_of_the_documentation_has_a_hat_which_only_equations_set_over_it
     assert drawn["scoring"].all("math") != []
 
 
+@pytest.mark.slow
 def test_a_guide_links_public_pages_that_it_names_and_shows_the_address_of_the_site(
     client: Client, benchmark: None
 ) -> None:

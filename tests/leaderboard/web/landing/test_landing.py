@@ -51,6 +51,7 @@ def test_each_ttc_range_names_its_leaders_and_their_value(client: Client, benchm
     ]
 
 
+@pytest.mark.slow
 def test_a_leader_has_its_interval_or_says_that_it_has_none_and_a_quoted_one_has_neither(
     client: Client, edition: Edition, owner: User, open_values: None
 ) -> None:
@@ -96,6 +97,7 @@ def filled_buttons(client: Client) -> list[pages.Element]:
     return [each for each in landing(client).all("a", class_="button") if "plain" not in each.classes]
 
 
+@pytest.mark.slow
 def test_its_one_filled_button_leads_to_a_split_that_is_open(client: Client, edition: Edition) -> None:
     (button,) = filled_buttons(client)
     assert (button.text, button.attributes["href"]) == ("Submit", "/submit/?split=test")
@@ -113,6 +115,7 @@ def test_its_one_filled_button_leads_to_a_split_that_is_open(client: Client, edi
     assert filled_buttons(client) == []
 
 
+@pytest.mark.slow
 def test_editions_are_linked_of_a_split_that_has_one(client: Client, edition: Edition) -> None:
     assert links_of_trust(client)["Editions and changelog"] == "/board/test/editions/"
     Split.objects.filter(pk="demo").update(current_edition=edition)
@@ -134,6 +137,7 @@ def test_what_one_downloads_to_submit_is_one_click_away(client: Client, edition:
     assert links["manifest (sequence list, CSV) of Test"] == "/api/v1/splits/test/manifest"
 
 
+@pytest.mark.slow
 def test_a_private_method_leads_nowhere_on_it_not_even_for_its_own_team(
     signed_in: Client, client: Client, edition: Edition, owner: User
 ) -> None:
@@ -195,6 +199,7 @@ def test_the_lead_is_as_significant_as_the_rank_range_of_the_first_row_says(
 # --- dates and news --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_dates_are_the_splits_and_for_the_signed_in_what_their_team_has_left(
     client: Client, edition: Edition, owner: User
 ) -> None:
@@ -209,6 +214,7 @@ def test_dates_are_the_splits_and_for_the_signed_in_what_their_team_has_left(
     assert "2 of 2" in text
 
 
+@pytest.mark.slow
 def test_news_are_editions_and_entries_the_newest_first(
     client: Client, rescored: Edition, entries: list[Submission]
 ) -> None:
@@ -232,6 +238,7 @@ def test_there_are_no_news_of_simulated_data(
     assert landing(client).all("h2", id="news") == []
 
 
+@pytest.mark.slow
 def test_news_name_an_anonymous_method_by_its_pseudonym(
     client: Client, edition: Edition, owner: User
 ) -> None:

@@ -133,6 +133,7 @@ def test_the_page_has_the_beginning_of_a_digest_and_the_export_has_all_of_it(
     assert digest in text_of(keeper.get(JSON))
 
 
+@pytest.mark.slow
 def test_events_have_names_and_links_and_the_words_of_people(
     keeper: Client, edition: Edition, owner: User, maintainer: User
 ) -> None:
@@ -324,6 +325,7 @@ def texts_of(value: ast.expr, tree: ast.Module) -> set[str]:
     return texts
 
 
+@pytest.mark.slow
 def test_every_verb_that_the_code_writes_has_words_of_its_own_and_none_has_words_in_vain() -> None:
     verbs, nouns = written()
     assert len(verbs) > 40
@@ -334,6 +336,7 @@ def test_every_verb_that_the_code_writes_has_words_of_its_own_and_none_has_words
         assert re.fullmatch("[A-Z]+[a-z ]+[a-z]", audit_tables.noun_words(noun)), noun
 
 
+@pytest.mark.slow
 def test_the_page_shows_every_verb_with_its_words(keeper: Client) -> None:
     verbs, _ = written()
     for number, verb in enumerate(sorted(verbs)):

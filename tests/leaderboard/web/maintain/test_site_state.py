@@ -3,6 +3,7 @@
 import random
 from datetime import timedelta
 
+import pytest
 from django.test import Client
 from django.utils import timezone
 from pytest_django import Settings
@@ -25,6 +26,7 @@ def state(keeper: Client) -> dict[str, tuple[str, bool]]:
     }
 
 
+@pytest.mark.slow
 def test_a_site_on_which_all_is_well_has_no_bad_line(keeper: Client, settings: Settings) -> None:
     settings.SENDS_MAIL = True
     pollers.sweep(rng=random.Random(0))

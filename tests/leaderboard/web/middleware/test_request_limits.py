@@ -92,6 +92,7 @@ def test_boards_as_of_a_time_have_a_rate_of_their_own_unless_answered_from_memor
     assert visitor.get(day).status_code == 200
 
 
+@pytest.mark.slow
 def test_searches_have_a_rate_of_their_own_and_the_empty_page_does_not_count() -> None:
     visitor = Client(REMOTE_ADDR=ATTACKER)
     assert visitor.get("/docs/search/").status_code == 200

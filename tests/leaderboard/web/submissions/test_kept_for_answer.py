@@ -52,6 +52,7 @@ def stored(settings: Settings) -> list[Path]:
     return sorted((Path(settings.FILES_DIR) / asked.FOLDER).glob("*"))
 
 
+@pytest.mark.slow
 def test_the_tick_alone_submits_the_file_that_was_asked_about(
     signed_in: Client, public: Edition, settings: Settings
 ) -> None:
@@ -68,6 +69,7 @@ def test_the_tick_alone_submits_the_file_that_was_asked_about(
     assert builders.score_all() == 3
 
 
+@pytest.mark.slow
 def test_without_the_tick_the_question_stays_and_the_file_too(signed_in: Client, public: Edition) -> None:
     answer = question(send(signed_in, builders.predictions(public, factor=1.2)))
     again = question(send(signed_in, **answer | {"confirmed": ""}))
@@ -77,6 +79,7 @@ def test_without_the_tick_the_question_stays_and_the_file_too(signed_in: Client,
     assert send(signed_in, **again).status_code == 302
 
 
+@pytest.mark.slow
 def test_a_script_keeps_the_file_itself_so_the_site_does_not(
     signed_in: Client, public: Edition, settings: Settings
 ) -> None:
@@ -85,6 +88,7 @@ def test_a_script_keeps_the_file_itself_so_the_site_does_not(
     assert stored(settings) == []
 
 
+@pytest.mark.slow
 def test_nobody_answers_with_the_file_of_another_account(
     client: Client, public: Edition, owner: User, stranger: User, teammate: User
 ) -> None:
@@ -105,6 +109,7 @@ def test_nobody_answers_with_the_file_of_another_account(
     assert send(client, **own).status_code == 302
 
 
+@pytest.mark.slow
 def test_an_answer_for_another_split_or_method_is_asked_again(
     signed_in: Client, public: Edition, owner: User, tmp_path: Path
 ) -> None:
@@ -119,6 +124,7 @@ def test_an_answer_for_another_split_or_method_is_asked_again(
     assert Submission.objects.latest("submitted_at").split_id == "val"
 
 
+@pytest.mark.slow
 def test_an_account_has_one_file_kept_and_a_later_question_replaces_it(
     signed_in: Client, public: Edition, settings: Settings
 ) -> None:
@@ -130,6 +136,7 @@ def test_an_account_has_one_file_kept_and_a_later_question_replaces_it(
     assert send(signed_in, **second).status_code == 302
 
 
+@pytest.mark.slow
 def test_after_an_hour_the_file_is_no_longer_taken_and_is_cleaned_away(
     client: Client, public: Edition, owner: User, stranger: User, settings: Settings
 ) -> None:
@@ -150,6 +157,7 @@ def test_after_an_hour_the_file_is_no_longer_taken_and_is_cleaned_away(
     assert send(client, **answers[stranger] | {"method": "Theirs"}).status_code == 302
 
 
+@pytest.mark.slow
 def test_a_store_that_takes_nothing_leaves_the_question_and_asks_for_the_file_again(
     signed_in: Client, public: Edition, settings: Settings
 ) -> None:
@@ -161,6 +169,7 @@ def test_a_store_that_takes_nothing_leaves_the_question_and_asks_for_the_file_ag
     assert send(signed_in, builders.predictions(public, factor=1.2), **answer).status_code == 302
 
 
+@pytest.mark.slow
 def test_a_kept_file_uses_no_slot_and_is_refused_as_any_other(signed_in: Client, public: Edition) -> None:
     answer = question(send(signed_in, builders.predictions(public, factor=1.2)))
     Split.objects.filter(pk="test").update(closes_at=timezone.now())
