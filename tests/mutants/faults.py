@@ -219,8 +219,12 @@ def _is_none(node: ast.expr) -> bool:
 
 
 def _walk(tree: ast.AST) -> Iterator[ast.AST]:
-    """The nodes, without those in f-strings, whose places some versions of Python do not tell."""
+    """The nodes, without those in f-strings, whose places some versions of Python do not tell.
+
+    Nor whether `zip` asks for equal lengths, which it gets.
+    """
     yield tree
     for child in ast.iter_child_nodes(tree):
-        if not isinstance(child, ast.JoinedStr):
+        is_strict = isinstance(child, ast.keyword) and child.arg == "strict"
+        if not isinstance(child, ast.JoinedStr) and not is_strict:
             yield from _walk(child)
