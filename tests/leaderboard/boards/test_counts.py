@@ -177,6 +177,38 @@ def test_a_methods_result_has_its_best_rival_and_the_two_that_are_nearest(four: 
     }
 
 
+@pytest.mark.parametrize(
+    ("values", "neighbours"),
+    [
+        ((2.0, 0.0, 2.0, 3.0), ["Second", "Veiled"]),  # an equal one comes after
+        ((0.0, 0.5, 1.0, 2.0), ["Second", "Veiled"]),
+        ((3.0, 0.0, 0.5, 2.0), ["Veiled", "Other"]),
+        ((1.0, 0.0, 2.0, None), ["Second", "Veiled"]),
+        ((3.0, 0.0, 2.0, None), ["Second", "Veiled"]),
+        ((3.0, 0.0, None, None), ["Second"]),
+        ((0.0, 3.0, None, None), ["Second"]),
+        ((0.0, None, None, None), []),
+    ],
+)
+def test_neighbours_are_the_row_before_and_the_one_after_or_the_two_next_to_an_end(
+    four: Four, values: Sequence[float | None], neighbours: list[str]
+) -> None:
+    for name, value in zip(("First", "Second", "Veiled", "Other"), values, strict=True):
+        if value is None:
+            Submission.objects.filter(method=four[name]).update(withdrawn_at=timezone.now())
+        else:
+            set_values(four, **{name: value})
+    four["Veiled"].visibility = "PUBLIC"
+    four["Veiled"].save()
+    builders.board_changed("test")
+    [found] = results.results(method=four["First"], viewer=ANYBODY)
+    assert names(found.neighbours) == neighbours
+    if neighbours:
+        assert (found.best.method, found.best.value) == ("Second", values[1])
+    else:
+        assert found.best is None
+
+
 def test_a_private_method_is_counted_for_its_team_where_it_would_be_and_seen_by_nobody_else(
     four: Four, owner: User, stranger: User
 ) -> None:

@@ -18,11 +18,13 @@ from leaderboard.models import (
     Evaluation,
     Method,
     PublishedResult,
+    Split,
     Status,
     Submission,
     User,
     Visibility,
 )
+from leaderboard.models.benchmark import Listing
 from leaderboard.people import teams
 from leaderboard.submissions import intake
 from tests import board_rows, builders
@@ -88,6 +90,18 @@ def test_the_order_in_which_rows_lie_changes_no_byte(
     assert client.get(API).content == before
 
 
+def test_published_editions_of_splits_that_are_not_switched_off_can_be_read(
+    edition: Edition, tmp_path: Path
+) -> None:
+    val = builders.import_truth(tmp_path, split="val")
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    assert set(snapshots.editions()) == {edition, val}
+    publish(second)
+    assert set(snapshots.editions()) == {edition, val, second}
+    Split.objects.filter(pk="val").update(listing=Listing.OFF)
+    assert set(snapshots.editions()) == {edition, second}
+
+
 # --- it is never old ---------------------------------------------------------------------------------------
 
 
@@ -106,6 +120,21 @@ def test_every_change_is_seen_by_the_very_next_reader(edition: Edition, owner: U
     [entry] = [e for e in client.get(API).json()["entries"] if e["kind"] == "submission"]
     assert entry["withdrawn_at"] is not None
     assert "withdrawn" in client.get(PAGE).text
+
+
+def test_a_board_that_was_read_without_its_version_is_as_new_as_one_with_it(
+    edition: Edition, filled: list[Method]
+) -> None:
+    def names() -> list[set[str]]:
+        [listed] = snapshots.splits()[:1]
+        [of_editions] = snapshots.editions()
+        read = [(edition.split, edition), (listed, edition), (edition.split, of_editions)]
+        shown = [snapshots.shown(split=split, edition=each).entries for split, each in read]
+        return [{entry.method for entry in entries} for entries in shown]
+
+    assert filled[0].name in names()[0]
+    by_hand(lambda: Method.objects.filter(pk=filled[0].pk).update(name="Renamed"))
+    assert all("Renamed" in each for each in names())
 
 
 def test_what_a_file_says_of_a_method_that_is_shown_at_that_moment_is_counted(
