@@ -197,9 +197,7 @@ def test_latency_has_ranked_public_rows_with_a_latency_and_names_the_others() ->
         ("S1", "40", "GPU", "yes"),
         ("P", "80", "CPU", ""),
     ]
-    assert chart.note == (
-        "Latency is self-reported on different hardware. No latency is given for S9."
-    )
+    assert chart.note == ("Latency is self-reported on different hardware. No latency is given for S9.")
     assert chart.label == (
         "MiD of each method against its latency, with the Pareto front: from S2 MiD 30.0 to S1 MiD 10.0."
     )
@@ -224,7 +222,9 @@ def hidden(entry: Entry) -> Entry:
 
 def test_four_latencies_are_a_chart_and_names_of_up_to_six_methods_without_one_are_given() -> None:
     assert not board_charts.latency(TIMED[:3], metric=MID)
-    assert board_charts.latency(TIMED[:4], metric=MID).note == "Latency is self-reported on different hardware."
+    assert (
+        board_charts.latency(TIMED[:4], metric=MID).note == "Latency is self-reported on different hardware."
+    )
     untimed = [sent(10 + i, 50.0) for i in range(7)]
     assert "S15." in board_charts.latency([*TIMED, *untimed[:6]], metric=MID).note
     assert "S15 and 1 other method." in board_charts.latency([*TIMED, *untimed], metric=MID).note
