@@ -79,9 +79,11 @@ def test_progress_has_attempts_of_shown_methods_by_day_and_quoted_rows_in_the_mi
         '<span class="">30.00</span>', '<span class="">25.50</span>', '<span class="d1">28.0</span>',
         '<span class="d1">20.0</span>', '<span class="d1">20.0</span>', '<span class="d1">10.5</span>',
     ]  # fmt: skip
-    front = [(datetime(2024, 7, 1), 30.0), (datetime(2026, 7, 1), 25.5), (day(5), 20.0), (day(9), 10.5)]
+    front = [
+        (day(1, month=7).replace(year=2024), 30.0), (day(1, month=7), 25.5), (day(5), 20.0), (day(9), 10.5),
+    ]  # fmt: skip
     best, behind_sent, front_sent, behind_quoted, front_quoted = series_of(chart)
-    corners = [[ms(at.replace(tzinfo=UTC)), value] for at, value in front]
+    corners = [[ms(at), value] for at, value in front]
     assert best["data"] == [*corners, [ms(NOON), 10.5]]
     assert places(behind_sent) == [("S1", [ms(day(3)), 28.0]), ("S1", [ms(day(7)), 20.0])]
     assert places(front_sent) == [("S2", corners[2]), ("S2", corners[3])]
@@ -182,8 +184,9 @@ def test_time_axis_has_whole_years_around_papers() -> None:
 
 
 TIMED = [
-    sent(1, 10.0, latency_ms=40.0, hardware="GPU"), sent(2, 30.0, latency_ms=5.0), sent(3, 20.0, latency_ms=12.5),
-    sent(4, 25.0, latency_ms=12.5), quoted("P", 35.5, 2024, latency_ms=80.0, hardware="CPU"),
+    sent(1, 10.0, latency_ms=40.0, hardware="GPU"), sent(2, 30.0, latency_ms=5.0),
+    sent(3, 20.0, latency_ms=12.5), sent(4, 25.0, latency_ms=12.5),
+    quoted("P", 35.5, 2024, latency_ms=80.0, hardware="CPU"),
 ]  # fmt: skip
 
 
