@@ -1,14 +1,17 @@
 """What is counted beside a row and on a board: of that split, edition, team and method alone."""
 
 from collections.abc import Sequence
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
 from django.utils import timezone
 
 from evaluator import SCORE_NAMES
-from leaderboard.boards import listing, movement, results, snapshots
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL
+from leaderboard.boards import filters, listing, movement, results, snapshots
 from leaderboard.boards.rows import Entry, scored_in
+from leaderboard.methods.details import MAX_FILTER_TEXT
 from leaderboard.models import Edition, Evaluation, Method, Score, Split, Status, Submission, User
 from leaderboard.people import teams
 from tests import board_rows, builders
@@ -128,6 +131,39 @@ def test_a_long_column_is_shortened_in_what_is_said_of_it() -> None:
     wrong = listing.UnknownColumn("x" * 70, known=["rank"])
     assert f"no “{'x' * 60}” column" in wrong.on_page
     assert ("'" + "x" * 60 + "' is not a date") in str(listing.BadTime("x" * 70))
+
+
+def test_floor_of_a_board_has_the_columns_of_its_edition_in_their_order() -> None:
+    floor = {"rte": 2.0, "other": 9.0, "mid": 1.0}
+    for edition, expected in (
+        (Edition(floor=floor, protocol=DEFAULT_PROTOCOL), [("mid", 1.0), ("rte", 2.0)]),
+        (Edition(protocol=DEFAULT_PROTOCOL), None),
+        (None, None),
+    ):
+        found = listing.Board(split=Split(), edition=edition, entries=()).floor
+        assert (list(found.items()) if found else found) == expected
+
+
+@pytest.mark.parametrize(("days", "text"), [(-1, "Beware."), (0, ""), (1, "")])
+def test_line_of_the_site_is_shown_until_it_ends(days: int, text: str) -> None:
+    now = timezone.now()
+    split, silent = Split(), Split()
+    split.site_line, split.site_line_ends_at = "Beware.", now - timedelta(days=days)
+    silent.site_line, silent.site_line_ends_at = None, None
+    assert snapshots.site_line_of([silent, split], now=now) == text
+    assert snapshots.site_line_of([silent], now=now) == ""
+
+
+@pytest.mark.parametrize("n_more", [0, 1])
+def test_filter_takes_a_text_up_to_its_limit(n_more: int) -> None:
+    text = "x" * (MAX_FILTER_TEXT + n_more)
+    if n_more:
+        with pytest.raises(
+            filters.BadFilter, match=f"at most {MAX_FILTER_TEXT} characters, found {len(text)}"
+        ):
+            filters.parse({"q": text})
+    else:
+        assert filters.parse({"q": text, "paper": " "}).wanted.keys() == {"q"}
 
 
 def test_an_attempt_ranks_by_its_first_score(four: Four, edition: Edition) -> None:

@@ -5,6 +5,7 @@ import json
 import pytest
 from django.test import Client
 
+from evaluator.metrics.protocol import SCORE_NAMES
 from evaluator.papers.tables import published_tables
 from evaluator.tables.published import printed_tables
 from leaderboard.models import PublishedResult
@@ -84,3 +85,58 @@ def test_the_rows_of_the_boards_are_those_of_the_main_table() -> None:
         for row in PublishedResult.objects.all()
     }
     assert shown == {(row.split, row.method): list(row.values) for row in table.rows}
+
+
+SWEEPS = {shown.table.name: shown for shown in printed_tables() if sweep(shown)}
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_sweep_has_a_line_and_marks_of_each_column_at_its_settings(name: str) -> None:
+    shown, chart = SWEEPS[name], sweep(SWEEPS[name])
+    table, base = shown.table, chart.options["baseOption"]
+    rows = [row for row in table.rows if isinstance(row.setting, int | float) and row.setting is not True]
+    settings = sorted({float(row.setting) for row in rows})
+    room = (settings[-1] - settings[0]) / 25
+    for axis in base["xAxis"]:
+        assert (axis["min"], axis["max"]) == pytest.approx((settings[0] - room, settings[-1] + room))
+        assert axis["axisLabel"]["formatter"]["of"] == [[each, f"{each:,g}"] for each in settings]
+        assert axis["name"] == shown.headings[shown.n_names - 1]
+    scores = [column for column in table.columns if column in SCORE_NAMES]
+    of_method = {row.method: [each for each in rows if each.method == row.method] for row in rows}
+    expected = {
+        (
+            ["mid", "rte"].index(column.partition("_")[0]),
+            tuple((float(row.setting), row.values[table.columns.index(column)]) for row in some),
+        )
+        for some in of_method.values()
+        for column in scores
+    }
+    lines, marks = ([each for each in base["series"] if each["type"] == kind] for kind in ("line", "scatter"))
+    assert {(each["yAxisIndex"], tuple(map(tuple, each["data"]))) for each in lines} == expected
+    assert {
+        (each["xAxisIndex"], tuple(tuple(mark["value"]) for mark in each["data"])) for each in marks
+    } == expected
+    # One colour and shape for each name, in all panels.
+    looks = {(each["name"], each["itemStyle"]["color"], each["symbol"]) for each in marks}
+    assert len(looks) == len({name for name, *_ in looks}) == len({(ink, shape) for _, ink, shape in looks})
+    assert {(each["name"], each["lineStyle"]["color"]) for each in lines} == {look[:2] for look in looks}
+    keys = {each["name"]: each["icon"] for each in chart.options["media"][0]["option"]["legend"]["data"]}
+    assert keys == {name: shape for name, _, shape in looks}
+    for each in marks:
+        for mark in each["data"]:
+            is_default = any(row.is_default for row in rows if row.setting == mark["value"][0])
+            assert ("the paper's default" in mark["read"]) is is_default
+            assert (mark.get("itemStyle", {}).get("color") == "--ground") is is_default
+            assert f" {mark['value'][1]:.1f}" in mark["read"][0]
+    assert chart.label.startswith("MiD and RTE for " if len(base["yAxis"]) == 2 else "MiD for ")
+    assert f" for {len(settings)} settings: {shown.title}." in chart.label
+    assert len(chart.rows) == len(shown.rows)
+
+
+def test_lowest_values_are_explained_where_they_are_marked_and_there_alone(client: Client) -> None:
+    drawn = client.get("/published/").context["tables"]
+    marked = [
+        any(cell.is_best for rows in each["row_groups"] for _, row in rows for cell in row) for each in drawn
+    ]
+    assert [each["has_best"] for each in drawn] == marked
+    assert {True, False} == set(marked)
