@@ -3,12 +3,14 @@
 import itertools
 import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 from django.db import connection, transaction
 from django.test import Client
 
 from leaderboard import board_versions
+from leaderboard.boards import snapshots
 from leaderboard.models import Score, User
 from tests import board_rows, builders
 from tests.services import ON_POSTGRESQL
@@ -58,3 +60,29 @@ def test_no_reader_gets_a_board_that_is_half_changed(benchmark: None, tmp_path: 
             thread.join()
     assert faults == []
     assert min(n_read) > 0
+
+
+def test_board_is_of_one_moment_although_it_takes_several_statements(
+    benchmark: None, tmp_path: Path, owner: User
+) -> None:
+    edition = builders.import_truth(tmp_path)
+    board_rows.fill(edition, n=2, user=owner)
+    changed = []
+
+    def change() -> None:
+        Score.objects.update(value=99.0)
+        connection.close()
+
+    def meanwhile(execute: Any, sql: str, *rest: Any) -> Any:
+        # After the rows, before their scores.
+        if 'FROM "leaderboard_score"' in sql and not changed:
+            changed.append(sql)
+            other = threading.Thread(target=change)
+            other.start()
+            other.join()
+        return execute(sql, *rest)
+
+    with connection.execute_wrapper(meanwhile):
+        entries = snapshots.shown(split=edition.split, edition=edition).entries
+    assert changed
+    assert 99.0 not in {value for entry in entries for value in entry.scores.values()}
