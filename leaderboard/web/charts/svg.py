@@ -9,11 +9,12 @@ from django.utils.safestring import SafeString
 
 # In percent of the width.
 _MARGIN: Final = 3.0
-_STEPS: Final = (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0)
+# Times a power of ten. Where 10 are too few for what begins between two ticks, 20 are enough.
+_STEPS: Final = (1.0, 2.0, 2.5, 5.0, 10.0, 20.0)
 
 
 def round_ticks(low: float, high: float, *, n: int) -> tuple[float, ...]:
-    """Return at most `n` steps in round numbers, from below `low` to above `high`.
+    """Return at most `n` steps, two or more, in round numbers, from below `low` to above `high`.
 
     >>> round_ticks(9.3, 31.0, n=4), round_ticks(0.6, 0.6, n=3)
     ((0.0, 10.0, 20.0, 30.0, 40.0), (0.6, 0.7))

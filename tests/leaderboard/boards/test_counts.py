@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from datetime import timedelta
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 from django.utils import timezone
@@ -147,9 +149,11 @@ def test_floor_of_a_board_has_the_columns_of_its_edition_in_their_order() -> Non
 @pytest.mark.parametrize(("days", "text"), [(-1, "Beware."), (0, ""), (1, "")])
 def test_line_of_the_site_is_shown_until_it_ends(days: int, text: str) -> None:
     now = timezone.now()
-    split, silent = Split(), Split()
-    split.site_line, split.site_line_ends_at = "Beware.", now - timedelta(days=days)
-    silent.site_line, silent.site_line_ends_at = None, None
+    ends_at = now - timedelta(days=days)
+    split, silent = (
+        cast("Split", SimpleNamespace(site_line=line, site_line_ends_at=end))
+        for line, end in (("Beware.", ends_at), (None, None))
+    )
     assert snapshots.site_line_of([silent, split], now=now) == text
     assert snapshots.site_line_of([silent], now=now) == ""
 

@@ -67,7 +67,7 @@ def test_board_is_of_one_moment_although_it_takes_several_statements(
 ) -> None:
     edition = builders.import_truth(tmp_path)
     board_rows.fill(edition, n=2, user=owner)
-    changed = []
+    changed: list[str] = []
 
     def change() -> None:
         Score.objects.update(value=99.0)

@@ -14,6 +14,7 @@ from leaderboard import board_versions
 from leaderboard.boards import listing, snapshots
 from leaderboard.methods import editing, visibility
 from leaderboard.models import (
+    BoardVersion,
     Edition,
     Evaluation,
     Method,
@@ -102,6 +103,14 @@ def test_published_editions_of_splits_that_are_not_switched_off_can_be_read(
     assert set(snapshots.editions()) == {edition, second}
 
 
+def test_splits_are_in_the_order_of_position_then_name_and_archived_ones_come_last(benchmark: None) -> None:
+    for name, position, listing_ in (("val", 1, "LISTED"), ("test", 1, "LISTED"), ("demo", 0, "ARCHIVED")):
+        Split.objects.filter(pk=name).update(position=position, listing=listing_)
+    assert [split.pk for split in snapshots.splits()] == ["test", "val", "demo"]
+    Split.objects.update(listing=Listing.LISTED)
+    assert [split.pk for split in snapshots.splits()] == ["demo", "test", "val"]
+
+
 # --- it is never old ---------------------------------------------------------------------------------------
 
 
@@ -135,6 +144,10 @@ def test_a_board_that_was_read_without_its_version_is_as_new_as_one_with_it(
     assert filled[0].name in names()[0]
     by_hand(lambda: Method.objects.filter(pk=filled[0].pk).update(name="Renamed"))
     assert all("Renamed" in each for each in names())
+    BoardVersion.objects.all().delete()
+    assert all("Renamed" in each for each in names())
+    by_hand(lambda: Method.objects.filter(pk=filled[0].pk).update(name="Once more"))
+    assert all("Once more" in each for each in names())
 
 
 def test_what_a_file_says_of_a_method_that_is_shown_at_that_moment_is_counted(

@@ -67,7 +67,7 @@ def test_curve_has_the_middle_of_each_range_and_no_line_over_a_gap() -> None:
     assert chart.label == "Mean MiD and RTE by true time to contact."
     plain = analysis_charts.curve([BINS[0], BINS[2]], [MID])
     assert (legend_of(plain), plain.has_intervals) == (["Mean error"], False)
-    assert not analysis_charts.curve([], [MID])
+    assert analysis_charts.curve([], [MID]).rows == ()
 
 
 def legend_of(chart: Chart) -> list[Any]:
@@ -138,7 +138,7 @@ def test_warnings_have_a_panel_for_each_side_without_thresholds_that_concern_no_
     )
     plain = analysis_charts.warnings(rows[:1])
     assert (legend_of(plain), plain.has_intervals) == ([], False)
-    assert not analysis_charts.warnings([])
+    assert analysis_charts.warnings([]).rows == ()
 
 
 # --- how errors are distributed ---------------------------------------------------------------------------
@@ -163,7 +163,7 @@ def test_histogram_has_a_bar_for_each_bin_and_the_last_one_holds_what_is_more() 
     assert (hidden["data"], hidden["show"]) == ([0, 1, 2], False)
     assert (scale["min"], scale["max"], scale["gridIndex"], scale["position"]) == (0.0, 3.0, 0, "bottom")
     assert scale["name"].endswith("(MiD), ×10⁻⁴")
-    assert not analysis_charts.histogram([], MID)
+    assert analysis_charts.histogram([], MID).rows == ()
 
 
 @pytest.mark.parametrize(
@@ -196,5 +196,6 @@ def test_scatter_has_each_sequence_in_the_order_of_truth_and_outliers_at_its_edg
     assert chart.rows == (("-25.000", "2.000"), ("1.000", "-30.000"), ("3.000", "99.000"))
     assert {css for _, css in chart.headings} == {"number"}
     for axis in ("xAxis", "yAxis"):
-        assert [(each["min"], each["max"]) for each in chart.options["baseOption"][axis]] == [(-20.0, 20.0)]
-    assert not analysis_charts.scatter({"true_s": [], "predicted_s": []})
+        [drawn_axis] = chart.options["baseOption"][axis]
+        assert [drawn_axis[name] for name in ("min", "max", "interval")] == [-20.0, 20.0, 10]
+    assert analysis_charts.scatter({"true_s": [], "predicted_s": []}).rows == ()

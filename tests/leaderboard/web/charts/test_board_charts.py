@@ -91,6 +91,9 @@ def test_progress_has_attempts_of_shown_methods_by_day_and_quoted_rows_in_the_mi
     assert [each["name"] for each in series_of(chart)] == [NAMES[0], *NAMES[1:2] * 2, *NAMES[2:] * 2]
     assert [each.get("symbol") for each in series_of(chart)[1:]] == ["circle"] * 2 + ["diamond"] * 2
     assert [each["itemStyle"]["color"] for each in series_of(chart)[1:]] == ["--ground", "--s1"] * 2
+    # What is better lies above what is behind it, and both above the line.
+    assert best["z"] < behind_sent["z"] == behind_quoted["z"] < front_sent["z"] == front_quoted["z"]
+    assert (best["step"], best["silent"], best["showSymbol"]) == ("end", True, False)
     assert chart.note == "Rows quoted from papers are placed in the middle of their year."
     assert chart.label.endswith(": from P MiD 30.00 to S2 MiD 10.5.")
     assert chart.headings[3] == ("MiD ×10⁻⁴", "number")
@@ -120,7 +123,7 @@ def test_results_of_three_dates_are_a_progress(n_dates: int, is_drawn: bool) -> 
     attempts = [attempt(1, day(i % n_dates + 1), 9.0 - i) for i in range(4)]
     assert board_charts.has_progress(ROWS[:1], attempts) is is_drawn
     chart = board_charts.progress(ROWS[:1], attempts, metric=MID, now=NOON)
-    assert bool(chart) is is_drawn
+    assert (bool(chart), len(chart.rows)) == (is_drawn, 4 * is_drawn)
     assert chart.note == ""
 
 
@@ -224,7 +227,7 @@ def hidden(entry: Entry) -> Entry:
 
 
 def test_four_latencies_are_a_chart_and_names_of_up_to_six_methods_without_one_are_given() -> None:
-    assert not board_charts.latency(TIMED[:3], metric=MID)
+    assert board_charts.latency(TIMED[:3], metric=MID).rows == ()
     assert (
         board_charts.latency(TIMED[:4], metric=MID).note == "Latency is self-reported on different hardware."
     )

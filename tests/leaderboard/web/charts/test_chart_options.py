@@ -125,6 +125,22 @@ def percent(text: str) -> float:
     return float(text.removesuffix("%"))
 
 
+@pytest.mark.parametrize(("n", "height_px"), [(2, 704), (3, 896)])
+@pytest.mark.parametrize("n_names", [0, 1, 6])
+def test_panels_above_each_other_share_the_height_that_the_legend_leaves(
+    n: int, height_px: int, n_names: int
+) -> None:
+    for layout in layouts(n, *["A" * 40] * n_names)[1:]:
+        ends = [[in_px(grid[side], height_px) for side in ("top", "bottom")] for grid in layout["grid"]]
+        heights = [height_px - top - bottom for top, bottom in ends]
+        assert max(heights) - min(heights) < 20
+        assert min(heights) > height_px / n / 3
+
+
+def in_px(side: int | str, height_px: int) -> float:
+    return percent(side) / 100 * height_px if isinstance(side, str) else side
+
+
 @pytest.mark.parametrize(
     ("names", "n_lines"),
     [
@@ -197,7 +213,8 @@ def test_chart_has_links_where_a_mark_has_one(href: str) -> None:
     [
         (9.3, 31.0, 4, (0, 10, 20, 30, 40)), (0.6, 0.6, 3, (0.6, 0.7)), (0.0, 0.0, 3, (0.0, 0.1)),
         (0.0, 4.0, 4, (0, 1, 2, 3, 4)), (0.0, 4.1, 4, (0, 2, 4, 6)), (0.0, 10.0, 4, (0, 2.5, 5, 7.5, 10)),
-        (0.0, 20.0, 4, (0, 5, 10, 15, 20)), (-3.0, 3.0, 4, (-4, -2, 0, 2, 4)), (0.0, 9.0, 1, (0, 10)),
+        (0.0, 20.0, 4, (0, 5, 10, 15, 20)), (-3.0, 3.0, 4, (-4, -2, 0, 2, 4)),
+        (5.0, 44.6, 4, (0, 20, 40, 60)),
         (13.2, 15.9, 4, (13, 14, 15, 16)), (0.3, 0.7, 4, (0.3, 0.4, 0.5, 0.6, 0.7)),
     ],
 )  # fmt: skip

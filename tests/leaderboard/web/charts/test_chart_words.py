@@ -1,5 +1,7 @@
 """What the pages of charts say around them, and the tables that hold the same numbers."""
 
+from dataclasses import replace
+
 import pytest
 
 from evaluator.tables.published import printed_tables
@@ -7,7 +9,7 @@ from leaderboard.boards.listing import Board
 from leaderboard.boards.rows import Entry
 from leaderboard.models import Split, Visibility
 from leaderboard.web.charts.chart_options import Chart
-from leaderboard.web.charts.chart_views import N_PROFILES, _cell_words, profile_note
+from leaderboard.web.charts.chart_views import N_PROFILES, _cell_words, _public, profile, profile_note
 from leaderboard.web.charts.paper_charts import MAX_TOGETHER, _about, _row_groups
 
 TABLES = {shown.table.name: shown for shown in printed_tables()}
@@ -50,6 +52,18 @@ def test_note_of_a_profile_says_which_public_methods_it_has(n_public: int, metho
 def test_note_of_a_profile_names_intervals_where_it_has_some() -> None:
     note = profile_note(board(2), chart(has_intervals=True))
     assert note.startswith("All methods on the board, with 95% confidence intervals where available.")
+
+
+def test_profile_has_the_first_public_rows_by_rank_then_name_and_last_those_without_a_rank() -> None:
+    def row(method: str, rank: int | None) -> Entry:
+        value = None if rank is None else float(rank)
+        return Entry(kind="submission", method=method, team="T", scores={"mid": value}, rank=rank)
+
+    rows = [row("Z", None), row("b", 2), row("A", 2), row("y", None), row("C", 1)]
+    unfiltered = (*rows, replace(row("Own", 1), visibility=Visibility.PRIVATE))
+    shown = Board(split=Split(name="test"), edition=None, entries=(), unfiltered=unfiltered)
+    assert profile(shown).columns[2:] == ("C", "A", "b")
+    assert [entry.method for entry in _public(shown)] == ["C", "A", "b", "y", "Z"]
 
 
 @pytest.mark.parametrize(

@@ -287,6 +287,22 @@ def test_first_rows_are_compared_once_the_page_is_read(client: Client, compared:
     assert Comparison.objects.count() == n_pairs
 
 
+@pytest.mark.parametrize(("n_first", "words"), [(3, "column, for the first 3 submissions."), (5, "column.")])
+def test_map_of_a_long_board_says_that_it_has_its_beginning(
+    client: Client, compared: list[Submission], monkeypatch: pytest.MonkeyPatch, n_first: int, words: str
+) -> None:
+    monkeypatch.setattr(comparisons, "N_FIRST", n_first)
+    client.get("/board/test/charts/")
+    # Half of them wait: the map is shown, and of more it is not.
+    made = list(Comparison.objects.values_list("pk", flat=True))
+    for n_waiting, is_early in ((len(made) // 2, False), (len(made) // 2 + 1, True)):
+        builders.infer_all()
+        Comparison.objects.filter(pk__in=made[:n_waiting]).update(differences=None, computed_at=None)
+        context = client.get("/board/test/charts/").context
+        assert (context["n_waiting"], context["is_early"]) == (n_waiting, is_early)
+        assert context["cell_words"].split("MiD of the ")[-1].startswith(words)
+
+
 def test_resolution_of_each_column_is_a_table_of_ranges_and_metrics(
     client: Client, compared: list[Submission]
 ) -> None:

@@ -67,7 +67,7 @@ def test_chart_of_one_method_has_no_legend_and_one_of_none_is_empty() -> None:
     assert [chart.n_panels, chart.options["media"][0]["option"]["legend"]["show"]] == [1, False]
     assert series_of(chart, "scatter")[0]["data"][0]["value"] == [0.0, 10.0]
     assert len(chart.rows) == 3
-    assert not profile([entry(1, n_values=0)])
+    assert profile([entry(1, n_values=0)]).rows == ()
 
 
 def test_intervals_are_whiskers_and_words_where_both_ends_are_known() -> None:

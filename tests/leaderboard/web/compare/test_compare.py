@@ -8,7 +8,7 @@ import pytest
 from django.test import Client
 
 from leaderboard.models import Comparison, Edition, Split, Submission, User
-from tests import builders, pages
+from tests import board_rows, builders, pages
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("open_values")]
 
@@ -132,6 +132,19 @@ def test_without_methods_it_offers_those_of_the_board(client: Client, entries: l
     rows = [row.text for row in root.one("tbody").all("tr")]
     assert all(re.search(r"Owls( \d+\.\d){2,}$", text.strip()) for text in rows), rows
     assert "No method has a score on Demo yet." in words(get(client, split="demo"))
+
+
+def test_first_fifty_are_offered_and_what_is_chosen_beyond_them(
+    client: Client, edition: Edition, owner: User
+) -> None:
+    board_rows.fill(edition, n=53, user=owner)
+    offered = [box.attributes["value"] for box in get(client).all("input", type="checkbox")]
+    assert len(offered) == 50
+    board = client.get("/api/v1/splits/test/board").json()["entries"]
+    ranked = [entry["method_id"] for entry in board if entry["kind"] == "submission"]
+    assert offered == ranked[:50]
+    root = pages.page(client.get("/compare/", {"split": "test", "with": ranked[-1]}))
+    assert [box.attributes["value"] for box in root.all("input", type="checkbox")] == [*offered, ranked[-1]]
 
 
 def test_choice_of_others_beside_a_method_has_it_ticked(client: Client, entries: list[Submission]) -> None:

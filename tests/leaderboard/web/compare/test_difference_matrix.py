@@ -174,6 +174,64 @@ def test_the_verdict_is_about_the_best_whatever_the_order(p: Sequence[float], se
     assert sentence in turned or sentence.replace("the other two", "") in turned
 
 
+@pytest.mark.parametrize(("n", "word"), [(2, "Two"), (3, "Three"), (4, "Four"), (5, "Five")])
+def test_title_and_verdict_count_the_methods_and_a_single_pair_stands_alone(n: int, word: str) -> None:
+    entries = [
+        replace(ENTRIES[0], method=f"M{i}", slug=f"m{i}", scores={"mid": 10.0 + i}, method_id=UUID(int=i + 1))
+        for i in range(n)
+    ]
+    made = compared(*[0.001] * (n * (n - 1) // 2), entries=entries)
+    edition = SimpleNamespace(unit="recording", unit_noun="recording", units="9 recordings")
+    world = replace(made, split=cast("Any", SimpleNamespace(is_hidden=False)), edition=cast("Any", edition))
+    tried = {UUID(int=1): 3}
+    page = compare_tables.comparison(world, n_tried=tried)
+    assert page["title"] == f"{word} methods compared"
+    assert (page["only_pair"] is page["pairs"][0]) is (n == 2)
+    assert (page["matrix"] is None) is (n == 2)
+    assert "M0</b> is the best of 3 scored submissions" in page["selection"].replace("strong>", "b>")
+    assert page["metric"].symbol == "MiD"
+    if n > 2:
+        assert f"Of these {word.lower()}, " in page["verdict"]
+    else:
+        assert page["verdict"] == page["pairs"][0]["sentence"]
+    for pair in page["pairs"]:
+        [group] = pair["groups"]
+        [row] = group["rows"]
+        both = (pair["pair"].first, pair["pair"].second)
+        assert (row["first"], row["second"]) == tuple(f"{each.value:.1f}" for each in both)
+        assert row["interval"] == difference_matrix.interval_of(pair["pair"].difference, decimals=1)
+        assert pair["has_intervals"]
+
+
+def test_verdict_of_too_few_recordings_says_so_and_of_withheld_pairs_why_once() -> None:
+    few = compare_tables.verdict(compared(None, None, None, reason="few"))
+    assert few == (
+        "Of these three, Near has the lowest MiD, 10.0. "
+        "There are too few recordings for confidence intervals and p-values."
+    )
+    made = compared(0.001, None, None)
+    pairs = [made.pairs[0], *(replace(pair, withheld="It is secret.") for pair in made.pairs[1:])]
+    text = compare_tables.verdict(replace(made, pairs=tuple(pairs)))
+    assert text.endswith("It is significantly better than Middle. It is secret.")
+
+
+def test_verdict_tells_what_is_better_among_these_methods_alone() -> None:
+    ends = ((1, 3), (1, 3), (1, 3))
+    entries = [
+        replace(entry, intervals={"mid": ConfidenceInterval(rank_low=low, rank_high=high)})
+        for entry, (low, high) in zip(ENTRIES, ends, strict=True)
+    ]
+    told = (
+        " Among these three, it is significantly better than {0}{1}; among all pairs of the board it is not, "
+        "and {0} may be the best."
+    )
+    both = compare_tables.verdict(compared(0.001, 0.001, 0.9, entries=entries))
+    assert both.endswith(told.format("Middle and Far", " (corrected for all 3 pairs)"))
+    one = compare_tables.verdict(compared(0.9, 0.001, 0.9, entries=entries))
+    assert "It is not significantly better than Middle (corrected for all 3 pairs)." in one
+    assert one.endswith(told.format("Far", ""))
+
+
 def test_ranges_that_do_not_meet_on_the_board_are_significant_and_a_possibly_best_one_is_so_here_alone() -> (
     None
 ):
