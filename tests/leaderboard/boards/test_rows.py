@@ -79,6 +79,7 @@ def test_boards_of_one_day_tell_the_hour_of_a_withdrawal_of_public_methods_alone
         for change in (-HOUR, HOUR, -DAY, DAY)
     )
     assert (day_before, day_after) == (False, True)
+    assert rows(edition, at=NOON)[methods[0].pk].withdrawn_at is not None
     # The whole day counts as the time after it.
     assert (before, after) == (visibility == "ANONYMOUS", True)
 
@@ -339,3 +340,26 @@ def test_a_preview_counts_the_attempts_of_the_methods_own_team(
     hidden = visibility_preview.preview(method=mine, visibility="ANONYMOUS", now=now)
     assert hidden.profile.name == mine.pseudonym
     assert hidden.boards[0].entry.n_attempts == 1
+
+
+def test_a_preview_tells_the_new_rank_of_each_row_that_falls_in_the_order_of_ranks(
+    edition: Edition, methods: list[Method], owner: User
+) -> None:
+    """Two rows have one name, and two one paper; each falls by itself."""
+    edition.split.published_results.all().delete()
+    for slug, title, name, value in (
+        ("a", "One", "same", 20.0), ("b", "Two", "same", 30.0), ("c", "One", "Other", 30.0),
+    ):  # fmt: skip
+        scores = dict.fromkeys(edition.rules.score_names, value)
+        edition.split.published_results.create(
+            slug=slug, method_name=name, authors="A", year=2024, source_title=title, source_table="1",
+            scores=scores, added_at=NOON - 9 * DAY,
+        )  # fmt: skip
+    mine = Method.objects.create(team=methods[0].team, name="Mine")
+    board_rows.score(edition, methods=[mine], user=owner, seed=3)
+    for method, value in ((methods[0], 10.0), (mine, 15.0), (methods[1], 40.0)):
+        Score.objects.filter(evaluation__submission__method=method).update(value=value)
+    moved = visibility_preview.preview(method=mine, visibility="PUBLIC", now=NOON).boards[0].moved
+    assert [(each.entry.slug or each.entry.method, each.entry.rank, each.rank_after) for each in moved] == [
+        ("a", 2, 3), ("c", 3, 4), ("b", 3, 4), (methods[1].name, 5, 6),
+    ]  # fmt: skip

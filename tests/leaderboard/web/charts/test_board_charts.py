@@ -91,6 +91,9 @@ def test_progress_has_attempts_of_shown_methods_by_day_and_quoted_rows_in_the_mi
     assert [each["name"] for each in series_of(chart)] == [NAMES[0], *NAMES[1:2] * 2, *NAMES[2:] * 2]
     assert [each.get("symbol") for each in series_of(chart)[1:]] == ["circle"] * 2 + ["diamond"] * 2
     assert [each["itemStyle"]["color"] for each in series_of(chart)[1:]] == ["--ground", "--s1"] * 2
+    assert all(each["itemStyle"]["borderWidth"] >= 1 for each in series_of(chart)[1:]), (
+        "neighbours stay apart"
+    )
     # What is better lies above what is behind it, and both above the line.
     assert best["z"] < behind_sent["z"] == behind_quoted["z"] < front_sent["z"] == front_quoted["z"]
     assert (best["step"], best["silent"], best["showSymbol"]) == ("end", True, False)

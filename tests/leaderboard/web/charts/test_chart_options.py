@@ -155,7 +155,9 @@ def test_ground_begins_below_all_lines_of_the_legend(
     none = [each["grid"][0]["top"] for each in layouts(1)]
     tops = [each["grid"][0]["top"] for each in layouts(1, *names)]
     assert [(top - least) / 24 for top, least in zip(tops, none, strict=True)] == list(n_lines)
-    assert {each["legend"]["show"] for each in layouts(1, *names)} == {bool(names)}
+    for each in layouts(1, *names):
+        shown = [each["legend"][name] for name in ("show", "left", "top")]
+        assert shown == [bool(names), 0, 0], "it begins in the corner of the drawing"
     lower = [each["grid"][0]["top"] for each in layouts(1, *names, top=30)]
     assert [low - top for low, top in zip(lower, tops, strict=True)] == [30, 30, 30]
 
