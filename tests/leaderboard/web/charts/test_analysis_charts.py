@@ -162,6 +162,8 @@ def test_histogram_has_a_bar_for_each_bin_and_the_last_one_holds_what_is_more() 
     hidden, scale = chart.options["baseOption"]["xAxis"]
     assert (hidden["data"], hidden["show"]) == ([0, 1, 2], False)
     assert (scale["min"], scale["max"], scale["gridIndex"], scale["position"]) == (0.0, 3.0, 0, "bottom")
+    [counts] = chart.options["baseOption"]["yAxis"]
+    assert (counts["min"], counts["minInterval"]) == (0, 1), "there is no half sequence"
     assert scale["name"].endswith("(MiD), ×10⁻⁴")
     assert analysis_charts.histogram([], MID).rows == ()
 

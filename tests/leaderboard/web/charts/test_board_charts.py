@@ -229,6 +229,15 @@ def hidden(entry: Entry) -> Entry:
     )  # fmt: skip
 
 
+def test_axes_have_room_for_names_below_the_front_and_before_the_fastest() -> None:
+    [axis] = board_charts.latency(TIMED, metric=MID).options["baseOption"]["xAxis"]
+    assert (axis["type"], axis["min"], axis["max"]) == ("log", 2.0, 100.0)
+    # 20 to 500 enclose the values: below them is less than a fifth.
+    far = [attempt(1, day(i), value) for i, value in ((1, 300.0), (2, 90.0), (3, 30.0))]
+    [axis] = board_charts.progress(ROWS[:1], far, metric=MID, now=NOON).options["baseOption"]["yAxis"]
+    assert (axis["type"], axis["min"], axis["max"]) == ("log", 10.0, 500.0)
+
+
 def test_four_latencies_are_a_chart_and_names_of_up_to_six_methods_without_one_are_given() -> None:
     assert board_charts.latency(TIMED[:3], metric=MID).rows == ()
     assert (
