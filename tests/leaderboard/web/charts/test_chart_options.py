@@ -1,5 +1,6 @@
 """Axes, legends and panels of charts: what has a place, and that nothing lies on anything else."""
 
+import re
 from typing import Any
 from uuid import UUID
 
@@ -8,6 +9,7 @@ import pytest
 from evaluator.metrics.registry import MID
 from leaderboard.web.charts import svg
 from leaderboard.web.charts.chart_options import (
+    _STACKED_PX,
     Chart,
     Frame,
     Mark,
@@ -17,6 +19,7 @@ from leaderboard.web.charts.chart_options import (
     ranks_axis,
     round_range,
 )
+from tests.services import REPOSITORY
 
 
 @pytest.mark.parametrize(
@@ -135,6 +138,26 @@ def test_panels_above_each_other_share_the_height_that_the_legend_leaves(
         heights = [height_px - top - bottom for top, bottom in ends]
         assert max(heights) - min(heights) < 20
         assert min(heights) > height_px / n / 3
+
+
+@pytest.mark.parametrize(
+    ("n", "narrow_px", "selector"),
+    [(2, 600, r':not\(\[data-panels="1"\], \[data-panels="3"\]\)'), (3, 900, r'\[data-panels="3"\]')],
+)
+def test_panels_stack_at_the_width_and_height_that_the_style_sheet_gives_them(
+    n: int, narrow_px: int, selector: str
+) -> None:
+    css = (REPOSITORY / "static/site.css").read_text()
+    [block] = [
+        part
+        for part in css.split("@container ")
+        if part.startswith(f"(max-width: {narrow_px}px)") and re.search(rf"\.chart{selector}:is\(", part)
+    ]
+    found = re.search(rf"\.chart{selector}:is\([^{{]*{{\s*height: (\d+)rem", block)
+    assert found is not None
+    assert int(found[1]) * 16 == _STACKED_PX[n]
+    queries = [each.get("query") for each in Frame([{}] * n, [{}] * n, []).options()["media"]]
+    assert queries[:2] == [None, {"maxWidth": narrow_px}]
 
 
 def in_px(side: int | str, height_px: int) -> float:

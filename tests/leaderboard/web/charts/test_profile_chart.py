@@ -82,6 +82,7 @@ def test_intervals_are_whiskers_and_words_where_both_ends_are_known() -> None:
         ("M1", 0, 1), ("M1", 1, 0), ("M2", 0, 0), ("M2", 1, 0),
     ]  # fmt: skip
     assert whiskers[0]["data"][0][1:] == [9.0, 12.0]
+    assert whiskers[0]["encode"] == {"x": 0, "y": [1, 2]}, "axes hold both ends of a span"
     marks = series_of(chart, "scatter")[0]
     assert [mark["read"][0] for mark in marks["data"][:2]] == [
         "MiD overall: 10.0 (9.0 to 12.0)",
