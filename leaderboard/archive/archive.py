@@ -62,7 +62,9 @@ def _board(split: Split, edition: Edition | None, written: dict[str, bytes]) -> 
     board = listing.board(split=split, edition=edition, viewer=AnonymousUser())
     address = absolute("edition", split.pk, edition.number) if edition else absolute("board", split.pk)
     stem = f"boards/{split.pk}/{f'edition-{edition.number}' if edition else 'quoted'}"
-    answer = _json(BoardSerializer(board, context={"has_intervals": True}).data)
+    answer = _json(
+        BoardSerializer(board, context={"has_intervals": True, "explained_by": board.edition}).data
+    )
     links: dict[str, str] = {}
     for each in tables.offered():
         links[each.title] = name = f"{stem}.{each.suffix}"
