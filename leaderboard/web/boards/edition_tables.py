@@ -125,14 +125,30 @@ def running(edition: Edition, progress: RescoringProgress) -> dict[str, Any]:
     pace = ""
     if progress.rate_per_s is not None:
         pace = f"{rate_words(progress.rate_per_s)}, about {duration(progress.left_s)} left"
+    counts = ", ".join(f"{grouped(n)} {end}" for n, end in ends if n)
     return {
         "edition": edition,
         "progress": progress,
-        "counts": ", ".join(f"{grouped(n)} {end}" for n, end in ends if n),
+        "words": _progress_words(edition, progress, counts=counts),
         "pace": pace,
         "is_final": progress.n_waiting == 0,
         "seen": f"{progress.n_done}-{progress.n_total}",
     }
+
+
+def _progress_words(edition: Edition, progress: RescoringProgress, *, counts: str) -> str:
+    """Word how far a re-scoring is; `counts` are its ends in words."""
+    if not progress.n_total:
+        return f"{edition.split.title} has no submissions to score."
+    submissions = counted(progress.n_total, "submission")
+    if not progress.n_waiting:
+        return f"Finished. {submissions}: {counts}." if counts else f"Finished. {submissions}."
+    words = f"{progress.percent}%. {grouped(progress.n_done)} of {submissions} finished"
+    if not counts:
+        return f"{words}."
+    # The pace, which stands beside it, tells more.
+    waiting = f"; {grouped(progress.n_waiting)} waiting or running" if progress.rate_per_s is None else ""
+    return f"{words}: {counts}{waiting}."
 
 
 def rate_words(rate_per_s: float) -> str:

@@ -133,6 +133,11 @@ class AuditRow(NamedTuple):
     subject: Subject
     details: list[tuple[str, str]]
 
+    @property
+    def detail_words(self) -> str:
+        """The details in one line, such as "name: A → B; reason: a name of a person"."""
+        return "; ".join(f"{name}: {value}" if name else value for name, value in self.details)
+
 
 def audit_rows(events: Iterable[AuditEvent]) -> list[AuditRow]:
     events = list(events)

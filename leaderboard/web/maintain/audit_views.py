@@ -11,6 +11,7 @@ from django import forms
 from django.core.paginator import Paginator
 from django.http import HttpRequest, HttpResponse, StreamingHttpResponse
 from django.shortcuts import render
+from django.urls import reverse
 from django.views.decorators.http import require_safe
 
 from leaderboard import audit
@@ -83,7 +84,15 @@ def events(request: HttpRequest) -> HttpResponse:
     if not asked.is_valid():
         return render(request, "maintain/audit.html", {"form": asked}, status=400)
     page = Paginator(audit.events(**asked.wanted()), PER_PAGE).get_page(request.GET.get("page"))
-    context = {"form": asked, "page": page, "query": asked.query(), "rows": audit_tables.audit_rows(page)}
+    query, noun_id = asked.query(), asked.cleaned_data["noun_id"]
+    context = {
+        "form": asked,
+        "page": page,
+        "query": query,
+        "rows": audit_tables.audit_rows(page),
+        "of_object": f" of the object with the ID {noun_id}" if noun_id else "",
+        "export_path": f"{reverse('maintain_audit_json')}{'?' if query else ''}{query}",
+    }
     return render(request, "maintain/audit.html", context)
 
 

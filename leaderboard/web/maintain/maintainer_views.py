@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, cast
+from typing import Any, Final, cast
 
 from django.contrib import messages
 from django.contrib.auth.views import redirect_to_login
@@ -24,7 +24,7 @@ from leaderboard.pages import texts
 from leaderboard.web.boards import edition_tables, tables
 from leaderboard.web.decorators import asks_first
 from leaderboard.web.forms import AskingForm, SiteForm
-from leaderboard.web.maintain import preview_tables, queue_tables, site_state
+from leaderboard.web.maintain import edition_words, preview_tables, queue_tables, site_state
 from leaderboard.web.maintain.maintainer_forms import (
     DiscardForm,
     OpenForm,
@@ -34,6 +34,8 @@ from leaderboard.web.maintain.maintainer_forms import (
 from leaderboard.web.submissions.submission_views import STOP_POLLING
 
 View = Callable[..., HttpResponseBase]
+
+MAX_LISTED: Final = 50
 
 
 def maintainers_only(view: View) -> View:
@@ -103,7 +105,9 @@ def open_edition(request: HttpRequest, split: str) -> HttpResponse:
             return redirect("maintain_edition", split, opened.number)
     choices = edition_tables.truth_choices(split_row, form.truths)
     drafts = Edition.objects.in_preparation().filter(split=split_row).select_related("ground_truth")
-    return form_page(request, "maintain/open.html", form, split=split_row, choices=choices, drafts=drafts)
+    verb = "Open a draft edition of" if form.truths else "Import ground truth for"
+    about = {"split": split_row, "verb": verb, "choices": choices, "drafts": drafts}
+    return form_page(request, "maintain/open.html", form, **about)
 
 
 @maintainers_only
@@ -113,6 +117,7 @@ def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
     past = history.record_of(row)
     context = {
         **_comparison(row, rows=request.GET.get("rows"), number=request.GET.get("page")),
+        "standing": edition_words.standing(row),
         "predecessor": corrections.predecessor(row.split),
         "past": past,
         "change": edition_tables.past_change(past),
@@ -161,9 +166,20 @@ def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
     states = dict(row.evaluations.values_list("submission", "status"))
     unfinished = [(each, states.get(each.pk, ABSENT)) for each in corrections.unfinished(row)]
     kinds = {state for _, state in unfinished}
+    rejected = preview_tables.newly_rejected(context["preview"])
+    left_out = edition_words.left_out(
+        n_unfinished=len(unfinished), n_rejected=context["preview"].n_newly_rejected
+    )
     context |= {
-        "rejected": preview_tables.newly_rejected(context["preview"]),
-        "unfinished": [(each, preview_tables.STATUS_LABELS[state]) for each, state in unfinished],
+        "why_not": edition_words.why_not_published(row),
+        "rejected": rejected[:MAX_LISTED],
+        "n_more_rejected": max(0, len(rejected) - MAX_LISTED),
+        "n_unfinished": len(unfinished),
+        "unfinished": [
+            (each, preview_tables.STATUS_LABELS[state]) for each, state in unfinished[:MAX_LISTED]
+        ],
+        "n_more_unfinished": max(0, len(unfinished) - MAX_LISTED),
+        "left_out": left_out,
         "has_failed": Status.SYSTEM_ERROR in kinds,
         "can_reopen": row.published_at and not row.reopened_at and ABSENT in kinds,
     }
@@ -200,8 +216,9 @@ def discard(request: HttpRequest, split: str, number: int) -> HttpResponse:
             done = "closed again" if row.published_at else "discarded"
             messages.success(request, f"Edition {number} of {split} was {done}.")
             return redirect("maintain")
-    running = edition_tables.running(row, corrections.progress(row))
-    return form_page(request, "maintain/discard.html", form, edition=row, running=running)
+    lead = edition_words.discarding(row, corrections.progress(row))
+    verb = "Close" if row.reopened_at else "Discard"
+    return form_page(request, "maintain/discard.html", form, edition=row, verb=verb, lead=lead)
 
 
 def maintainer_of(request: HttpRequest) -> User:
@@ -215,7 +232,11 @@ def _edition(split: str, number: int) -> Edition:
 
 def _comparison(row: Edition, *, rows: str | None = None, number: str | None = None) -> dict[str, Any]:
     context = _effects(row)
-    return context | {"table": preview_tables.change_table(context["preview"], rows=rows, number=number)}
+    return {
+        **context,
+        "comparison_heading": edition_words.comparison_heading(row),
+        "table": preview_tables.change_table(context["preview"], rows=rows, number=number),
+    }
 
 
 def _effects(row: Edition) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from django.core.exceptions import ValidationError
 from django.db.models import Prefetch, Q, QuerySet
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
@@ -284,6 +285,7 @@ def _with_states(sent: QuerySet[Submission]) -> list[Submission]:
         by_edition: dict[int | None, Evaluation] = {each.edition_id: each for each in row.evaluations.all()}
         row.evaluation = by_edition.get(row.split.current_edition_id)  # type: ignore[attr-defined]  # for the template
         row.can_be_withdrawn = outcomes.can_be_withdrawn(row)  # type: ignore[attr-defined]  # likewise
+        row.spoken = f" {row.method.name}, {row.split_id}"  # type: ignore[attr-defined]  # likewise
     return rows
 
 
@@ -305,7 +307,8 @@ def action(request: HttpRequest, action_name: str, subject_id: str) -> HttpRespo
             (_confirmed if chosen.asks_who else _done)(request, chosen, subject, arguments)
             messages.success(request, chosen.done)
             return redirect("maintain_team", team.pk) if team else redirect("maintain_teams")
-    about = {"action": chosen, "subject": _name_of(subject), "team": team}
+    back = reverse("maintain_team", args=[team.pk]) if team else reverse("maintain_teams")
+    about = {"action": chosen, "subject": _name_of(subject), "team": team, "back": back}
     return form_page(request, "maintain/action.html", form, **about)
 
 

@@ -182,13 +182,17 @@ def _change_row(change: Change, names: Sequence[str], preview: Preview) -> dict[
     old_status, new_status = (STATUS_LABELS[s] for s in (change.old_status, change.new_status))
     is_news = change.problems and change.old_status != change.new_status
     reason = change.problems[0]["message"] if is_news else ""
+    summary = reason.partition(": ")[0]
+    status = new_status if old_status == new_status else f"{new_status} (before: {old_status})"
+    state = "" if status == STATUS_LABELS[Status.SCORED] else status
     return {
         "change": change,
         "has_changed": change.old_rank != change.new_rank,
-        "status": new_status if old_status == new_status else f"{new_status} (before: {old_status})",
+        "status": status,
+        "state": f"{state}: {summary}" if state and summary else state,
         "is_worse_off": change.old_status == Status.SCORED and change.new_status in _ENDED_BADLY,
         "differences": [_difference(name, change, preview) for name in names],
-        "summary": reason.partition(": ")[0],
+        "summary": summary,
         "reason": reason,  # why it is rejected now and was not
         "n_more_problems": max(0, len(change.problems) - 1),
     }
@@ -197,13 +201,16 @@ def _change_row(change: Change, names: Sequence[str], preview: Preview) -> dict[
 def _difference(name: str, change: Change, preview: Preview) -> dict[str, Any]:
     delta = change.delta[name]
     css = column_css(name, primary=preview.edition.rules.primary.name).replace("wide", "")
+    old = format_rounded(change.old.get(name), decimals=change.old_decimals)
+    new = format_rounded(change.new.get(name), decimals=change.new_decimals)
+    is_dropped = name not in preview.edition.rules.score_names
+    is_new = name not in preview.published.rules.score_names
     return {
-        "old": format_rounded(change.old.get(name), decimals=change.old_decimals),
-        "new": format_rounded(change.new.get(name), decimals=change.new_decimals),
+        "was": "" if is_dropped or is_new or old == new else old,
+        "now": old if is_dropped else new,
+        "is_struck": is_dropped and change.old.get(name) is not None,
         "delta": delta_words(delta, decimals=max(change.old_decimals, change.new_decimals)),
         "css": css if delta else f"{css} same".strip(),
-        "is_dropped": name not in preview.edition.rules.score_names,
-        "is_new": name not in preview.published.rules.score_names,
     }
 
 

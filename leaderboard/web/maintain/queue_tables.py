@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 from django.core.paginator import Paginator
 from django.db.models import Count, Max, Min, QuerySet
 
+from evaluator.counting import counted
 from leaderboard.db import clock
 from leaderboard.models import Evaluation, Status, Visibility
 from leaderboard.ops import health
@@ -42,10 +43,13 @@ def totals(*, split: str = "") -> dict[str, Any]:
     counts = {name: by_status.get(state.status, (0, None))[0] for name, state in STATES.items()}
     _, oldest_at = by_status.get(Status.QUEUED, (0, None))
     age = clock.database_now() - oldest_at if oldest_at else timedelta()
+    oldest_age = duration(age.total_seconds()) if oldest_at else ""
+    failed = counted(counts["failed"], "system error") if counts["failed"] else ""
     return {
         "counts": counts,
         "n": sum(counts.values()),
-        "oldest_age": duration(age.total_seconds()) if oldest_at else "",
+        "facts": [fact for fact in (failed, oldest_age and f"oldest {oldest_age}") if fact],
+        "oldest_age": oldest_age,
         "is_slow": age > health.MAX_QUEUE_AGE,
     }
 
@@ -66,18 +70,31 @@ def queue_table(*, state: str = "", split: str = "", number: Any = 1) -> dict[st
         paginator.count = summary["counts"][name]
         page = paginator.get_page(number if state else 1)
         rows = [(each, ", ".join(_tags(each)), strike_words(each), _until(each, now=now)) for each in page]
-        sections.append({"name": name, "heading": STATES[name].heading, "page": page, "rows": rows})
+        heading, nothing = STATES[name].heading, nothing_words(name)
+        sections.append({"name": name, "heading": heading, "nothing": nothing, "page": page, "rows": rows})
         shown += [page.number, *((row.pk, row.attempt, row.last_error, *more) for row, *more in rows)]
     return {
         **summary,
         "headings": [(name, each.heading, summary["counts"][name]) for name, each in STATES.items()],
         "sections": sections,
+        "nothing": nothing_words(state),
         "faults": faults,
         "has_worker": has_worker,
         "max_age_s": f"{health.MAX_SWEEP_AGE_S:.0f}",
         "finished_at": finished_at,
         "seen": hashlib.sha256(repr(shown).encode()).hexdigest()[:16],
     }
+
+
+def nothing_words(state: str) -> str:
+    """Say that a list is empty, or all of them.
+
+    >>> nothing_words("failed"), nothing_words("running"), nothing_words("")
+    ('No system errors.', 'No running evaluations.', 'Nothing is waiting, running or failed.')
+    """
+    if not state:
+        return "Nothing is waiting, running or failed."
+    return "No system errors." if state == "failed" else f"No {state} evaluations."
 
 
 def _listed(state: State, *, split: str) -> QuerySet[Evaluation]:

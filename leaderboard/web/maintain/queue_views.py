@@ -78,8 +78,7 @@ def retry(request: HttpRequest) -> HttpResponse:
             messages.warning(request, f"{str(race).capitalize()}.")
     if n_retried:
         messages.success(request, f"{counted(n_retried, 'evaluation')} queued again.")
-    query = request.GET.urlencode()
-    return redirect(f"{reverse('maintain_queue')}{'?' if query else ''}{query}")
+    return redirect(_path("maintain_queue", request.GET.urlencode()))
 
 
 def _page(request: HttpRequest, *, status: int = 200, **more: Any) -> HttpResponse:
@@ -92,10 +91,21 @@ def _page(request: HttpRequest, *, status: int = 200, **more: Any) -> HttpRespon
 def _context(request: HttpRequest, asked: QueueFilter) -> dict[str, Any]:
     table = queue_table(**asked.cleaned_data, number=request.GET.get("page"))
     number = table["sections"][0]["page"].number if asked.cleaned_data["state"] else 1
+    of_split = asked.query(state="")
+    page_query = asked.query(page=number if number > 1 else "")
     return {
         "form": asked,
         "shown": table,
         "query": asked.query(),
-        "split_query": asked.query(state=""),
-        "page_query": asked.query(page=number if number > 1 else ""),
+        "and_split": f"&{of_split}" if of_split else "",
+        "page_query": page_query,
+        "paths": {
+            "page": _path("maintain_queue", page_query),
+            "state": _path("maintain_queue_state", page_query),
+            "retry": _path("maintain_retry", page_query),
+        },
     }
+
+
+def _path(view: str, query: str) -> str:
+    return f"{reverse(view)}?{query}" if query else reverse(view)

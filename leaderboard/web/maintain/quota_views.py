@@ -1,6 +1,7 @@
 """Quotas for maintainers: rules, overrides, admissions."""
 
 from collections.abc import Mapping
+from typing import Any
 from uuid import UUID
 
 from django.conf import settings
@@ -8,6 +9,7 @@ from django.contrib import messages
 from django.core.paginator import Paginator
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
@@ -34,7 +36,7 @@ def quota_rules(request: HttpRequest) -> HttpResponse:
     context = {
         "splits": [(split, quota_tables.rules_of(split)) for split in Split.objects.all()],
         "page": page,
-        "overrides": [(row, quota_tables.rules_of(row)) for row in page],
+        "overrides": [(row, quota_tables.rules_of(row) | {"spoken": _spoken(row)}) for row in page],
         "are_off": not settings.QUOTAS,
     }
     return render(request, "maintain/quotas.html", context)
@@ -96,7 +98,7 @@ def admit(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
     lead = "Once admitted, the team can submit whenever the split is open."
     words = {"heading": "Admit a team", "lead": lead, "button": "Admit"}
     subject = f"{team.name} on {split_row.title}"
-    return form_page(request, "maintain/action.html", form, action=words, team=team, subject=subject)
+    return form_page(request, "maintain/action.html", form, team=team, subject=subject, **_asked(team, words))
 
 
 @maintainers_form
@@ -110,7 +112,19 @@ def end_admission(request: HttpRequest, team_id: UUID, split: str) -> HttpRespon
     lead = "The team can submit nothing more to the split. What it sent stays."
     words = {"heading": "Revoke an admission", "lead": lead, "button": "Revoke the admission"}
     subject = f"{row.team.name} on {split}"
-    return form_page(request, "maintain/action.html", form, action=words, team=row.team, subject=subject)
+    return form_page(
+        request, "maintain/action.html", form, team=row.team, subject=subject, **_asked(row.team, words)
+    )
+
+
+def _spoken(row: QuotaOverride) -> str:
+    """Return what tells the links to an override apart for who hears them."""
+    return f" the override for {row.team.name} on {row.split_id}"
+
+
+def _asked(team: Team, words: Mapping[str, str]) -> dict[str, Any]:
+    """Return the words of a page that asks before an action, and the way back to the team."""
+    return {"action": words, "back": reverse("maintain_team", args=[team.pk])}
 
 
 def _form(

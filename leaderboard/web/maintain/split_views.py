@@ -34,6 +34,7 @@ def splits(request: HttpRequest) -> HttpResponse:
     rows = [
         (
             split,
+            truth_words(split),
             (admissions.sentence_of(split, now=now) or "yes")
             if split.has_ground_truth
             else "no: ground truth not imported",
@@ -43,6 +44,12 @@ def splits(request: HttpRequest) -> HttpResponse:
         for split in Split.objects.select_related("current_edition", "same_truth_as")
     ]
     return render(request, "maintain/splits.html", {"rows": rows})
+
+
+def truth_words(split: Split) -> str:
+    """Say who knows the ground truth of a split, and whose it is."""
+    words = "hidden" if split.is_hidden else "open"
+    return f"{words}, that of {split.same_truth_as.title}" if split.same_truth_as else words
 
 
 @maintainers_form

@@ -29,7 +29,7 @@ from leaderboard.models import (
     SweepBeat,
     User,
 )
-from tests import builders
+from tests import builders, pages
 from tests.leaderboard.web.account.proving import proving
 
 pytestmark = pytest.mark.django_db
@@ -195,8 +195,8 @@ def test_a_maintainer_previews_an_announcement_and_sends_it_once(
 ) -> None:
     assert "Nobody would get this email now." in keeper.get("/maintain/splits/test/mail/").text
     builders.submit(owner, builders.predictions(edition))
-    page = keeper.get("/maintain/splits/test/mail/").text
-    assert ">1 person</a>: everyone whose team has submitted to Test" in page
+    lead = pages.get(keeper, "/maintain/splits/test/mail/").one("p", class_="lead")
+    assert "goes to 1 person: everyone whose team has submitted to Test, except" in lead.text
     address, draft = "/maintain/splits/test/mail/", {"subject": "Moved", "text": "First.\r\n\r\nSecond <b>."}
     assert keeper.post(address, {"subject": "", "text": " "}).status_code == 422
     assert keeper.post(address, draft | {"subject": "x" * 151}).status_code == 422
