@@ -73,6 +73,11 @@ def test_attempts_of_a_draft_are_not_counted(four: Four, edition: Edition, owner
     )
     board_rows.score(draft, methods=[four["Other"]], user=owner, seed=3)
     assert attempts()["Other"] == 2
+    [late] = board_rows.fill(draft, n=1, user=owner)
+    own = Method.objects.create(team=four["First"].team, name="Own", visibility="PRIVATE")
+    board_rows.score(draft, methods=[own], user=owner, seed=4)
+    board = listing.board(split=split_called(), edition=draft, viewer=owner)
+    assert {entry.method: entry.n_attempts for entry in board.entries} == {"Other": 2, late.name: 0, "Own": 0}
     Edition.objects.filter(pk=draft.pk).update(published_at=timezone.now())
     assert attempts()["Other"] == 3
 

@@ -89,7 +89,9 @@ def test_pair_without_a_test_says_why_and_has_a_rim(shown: str, name: str, which
     assert ("not tested in pairs" in chart.note) is (shown == "ANONYMOUS")
 
 
-@pytest.mark.parametrize(("n", "is_low", "has_words"), [(6, True, True), (7, True, False), (9, False, False)])
+@pytest.mark.parametrize(
+    ("n", "is_low", "has_words"), [(6, True, True), (7, True, False), (8, True, False), (9, False, False)]
+)
 def test_map_of_few_is_low_and_shows_differences_also_on_a_phone(
     n: int, is_low: bool, has_words: bool
 ) -> None:
