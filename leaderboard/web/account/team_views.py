@@ -69,6 +69,7 @@ def _team_page(user: User, *, now: datetime) -> dict[str, Any]:
         "members": members,
         "is_owner": is_owner,
         "is_alone": is_alone,
+        "can_change_members": is_owner and not is_alone,
         # Each with its state, and without its secret.
         "invitations": [(row, invitations.state_of(row, now=now)) for row in rows],
         # Methods would be left to nobody if this person left.
