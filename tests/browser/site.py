@@ -75,10 +75,11 @@ def _end_worker(site: Site) -> None:
 
 def open_split(site: Site, split: str) -> evaluator.GroundTruth:
     """Give a split made-up ground truth: 1,200 sequences in 40 recordings."""
-    # No two splits may have the same truth: the site refuses the second.
-    truth = simulate(rng=np.random.default_rng([*split.encode()]), n_sequences=1_200, n_recordings=40)
+    simulated = simulate(rng=np.random.default_rng([*split.encode()]), n_sequences=1_200, n_recordings=40)
     table = site.directory / f"{split}.csv"
-    table.write_bytes(truth.to_csv())
+    # No two splits may share a sequence: the site refuses the second.
+    table.write_bytes(simulated.to_csv().replace(b"sim-", f"sim-{split}-".encode()))
+    truth = evaluator.read_truth(table)
     site.manage("import_truth", split, str(table))
     return truth
 

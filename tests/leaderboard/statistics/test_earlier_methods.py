@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def board(owner: User, tmp_path: Path) -> Edition:
+def board(benchmark: None, owner: User, tmp_path: Path) -> Edition:
     """Two methods with no warning error, and one with many, on an open split."""
     edition = builders.import_truth(tmp_path, split="val", protocol="tsttc-2")
     builders.open_values(edition)
