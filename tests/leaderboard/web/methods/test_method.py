@@ -190,7 +190,7 @@ def test_own_method_offers_the_next_submission_and_lists_the_rejected_ones(
     links = {a.text: a for a in main.one("p", class_="actions").all("a")}
     assert list(links) == ["Submit again", "Edit details", "All submissions", "Delete…"], "nothing to publish"
     assert [row.all("td")[3].text for row in main.one("tbody").all("tr")] == [
-        "rejectedThe outermost value is a list"
+        "rejected The outermost value is a list"
     ]
     address = html.unescape(links["Submit again"].attributes["href"])
     form = pages.get(signed_in, address).one("form", id="submit")

@@ -24,15 +24,15 @@ def test_list_has_my_teams_submissions_with_state_and_errors(
         [cell.text for cell in row.all("td")]
         for row in pages.page(signed_in.get("/submissions/")).one("tbody").all("tr")
     ]
-    assert [row[1].removesuffix("predictions.json") for row in rows] == [
+    assert [row[1].removesuffix(" predictions.json") for row in rows] == [
         "Waiting one",
         "Bad one",
         "Scored one",
     ]
     assert [row[3] for row in rows] == [
         "queued",
-        "rejectedThe outermost value is a list",
-        "scoredBest of its method: compare with others: Scored one",
+        "rejected The outermost value is a list",
+        "scored Best of its method: compare with others: Scored one",
     ]
     mid = scored.evaluations.get().scores.get(metric="mid", ttc_range="overall").value
     assert [row[4] for row in rows] == ["–", "–", f"{mid:.1f}"]
