@@ -70,6 +70,7 @@ lint: $(DEV_STAMP) ## check style, types, import layers and migrations
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(BIOME) format static
+	$(VENV)/bin/djangofmt --check templates
 	$(PY) -m mypy .
 	$(VENV)/bin/lint-imports
 	$(PY) manage.py makemigrations --check --dry-run
@@ -78,6 +79,7 @@ format: $(DEV_STAMP) ## format the code
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 	$(BIOME) format --write static
+	$(VENV)/bin/djangofmt --quiet templates
 
 screenshots: $(DEV_STAMP) ## take the README's screenshots of the demo, into docs/screenshots/
 	$(PY) -m tests.browser.screenshots
