@@ -9,7 +9,7 @@ from allauth.account.models import EmailAddress
 from allauth.mfa.models import Authenticator
 from allauth.socialaccount.models import SocialAccount
 from django.core import serializers
-from django.db.models import Model
+from django.db.models import Model, Q
 from django.utils import timezone
 
 from leaderboard import audit, board_versions
@@ -209,3 +209,44 @@ def test_the_export_has_the_invitation_that_the_person_accepted(
     teams_of_invitations = {row["team"] for row in forgetting.export(user=two[0])["invitations"]}
     assert teams_of_invitations == {str(teams.team_of(user=user).pk) for user in two}
     assert forgetting.export(user=maintainer)["invitations"] == []
+
+
+def test_names_that_the_person_gave_or_had_are_blanked_and_those_of_another_stay(
+    two: tuple[User, User], maintainer: User
+) -> None:
+    owner, stranger = two
+    for user in two:
+        audit.record_of(user, "renamed", actor=maintainer, names={"to": f"Dr {user.name}"})
+    gave, had = ({"actor": owner}, {"noun": "User", "noun_id": str(owner.pk)})
+    of_stranger = Q(actor=stranger) | Q(noun="User", noun_id=str(stranger.pk))
+    before = set(AuditText.objects.filter(of_stranger).values_list("pk", "text"))
+    assert "" not in {text for _, text in before}
+    forget(owner)
+    for fields in (gave, had):
+        assert set(AuditText.objects.filter(**fields).values_list("text", flat=True)) == {""}
+    assert set(AuditText.objects.filter(of_stranger).values_list("pk", "text")) == before
+
+
+def test_mails_of_the_person_to_an_address_that_was_never_theirs_go_and_those_of_another_stay(
+    two: tuple[User, User],
+) -> None:
+    for user in two:
+        Mail.objects.create(kind="scored", user=user, recipient="desk@example.org", text=user.name)
+    forget(two[0])
+    left = Mail.objects.filter(recipient="desk@example.org")
+    assert [mail.user for mail in left] == [two[1]]
+
+
+def test_late_rows_of_a_forgotten_account_go_and_a_closed_one_keeps_its_own(two: tuple[User, User]) -> None:
+    owner, stranger = two
+    User.objects.filter(pk=stranger.pk).update(is_active=False)
+    before = rows_of(stranger)
+    forget(owner)
+    EmailAddress.objects.create(user=owner, email="late@example.org")
+    Authenticator.objects.create(user=owner, type=Authenticator.Type.TOTP, data={})
+    SocialAccount.objects.create(user=owner, provider="github", uid="late")
+    forgetting.delete_late_rows()
+    for model in (EmailAddress, Authenticator, SocialAccount):
+        assert not model.objects.filter(user=owner).exists()
+        assert model.objects.filter(user=stranger).exists()
+    assert rows_of(stranger) == before

@@ -166,6 +166,19 @@ def test_a_public_name_that_is_taken_is_refused_and_a_private_one_may_look_like_
     assert Method.objects.get(pk=sent.method_id).name == "Second"
 
 
+@pytest.mark.parametrize(("name", "twin"), [("SECOND", "Second"), ("PRINTED", "Printed")])
+def test_a_public_method_gets_no_name_that_looks_like_one_of_a_method_or_a_paper(
+    pair: tuple[Submission, Submission], maintainer: User, name: str, twin: str
+) -> None:
+    builders.quote("Printed", {})
+    with pytest.raises(Refused, match=f"already have a method '{twin}'") as caught:
+        hiding.rename_method(
+            method=pair[0].method, name=name, reason="R", actor=maintainer, now=timezone.now()
+        )
+    assert caught.value.field == "name"
+    assert set(Method.objects.values_list("name", flat=True)) == {"First", "Second"}
+
+
 def test_an_account_is_closed_and_opened_by_what_the_log_says(
     owner: User, stranger: User, maintainer: User
 ) -> None:

@@ -23,7 +23,7 @@ from tests.leaderboard.web.test_every_page import assert_sound
 
 EMAIL = "/accounts/email/"
 EVIL = "evil@example.org"
-DAY = timedelta(days=1)
+DAY, HOUR = timedelta(days=1), timedelta(hours=1)
 
 
 @pytest.fixture(autouse=True)
@@ -483,3 +483,85 @@ def test_ways_into_the_accounts_of_others_stay_when_one_is_given_back(
     assert list(EmailAddress.objects.filter(user=stranger).values_list("email", "primary")) == [
         ("mine@example.org", True)
     ]
+
+
+def test_sessions_of_an_account_that_a_maintainer_gives_back_end_and_those_of_others_stay(
+    victim: User, stranger: User, maintainer: User
+) -> None:
+    def enter(user: User) -> Client:
+        client = Client()
+        client.force_login(user)
+        return client
+
+    own = enter(stranger)
+    for _ in range(2):
+        enter(victim)
+    Authenticator.objects.create(user=victim, type=Authenticator.Type.TOTP, data={"secret": "A" * 32})
+    waiting = Client()
+    waiting.post("/accounts/login/", {"login": victim.email, "password": "correct horse"})
+    # Whoever typed an address of the account holds it in a session of their own.
+    confirm(own)
+    own.post(EMAIL, {"action_add": "", "email": victim.email})
+    assert Session.objects.count() == 4
+    assert victim.email in str(Session.objects.get(pk=own.session.session_key).get_decoded())
+    takeovers.give_back(
+        user=victim, address="new@example.org", reason="R", actor=maintainer, now=timezone.now()
+    )
+    left = Session.objects.get()
+    assert left.session_key == own.session.session_key
+    assert "owner@example.org" not in str(left.get_decoded())
+
+
+def test_apps_and_connected_accounts_from_before_a_change_stay_and_later_ones_end(victim: User) -> None:
+    now = timezone.now()
+    kinds = (Authenticator.Type.TOTP, Authenticator.Type.RECOVERY_CODES)
+    for kind, uid, at in zip(kinds, ("before", "after"), (now - DAY, now), strict=True):
+        app = Authenticator.objects.create(user=victim, type=kind, data={})
+        Authenticator.objects.filter(pk=app.pk).update(created_at=at)
+        connected = SocialAccount.objects.create(user=victim, provider="github", uid=uid)
+        SocialAccount.objects.filter(pk=connected.pk).update(date_joined=at)
+    links = takeovers.note(user=victim, what="x", before=[victim.email], now=now)
+    takeovers.undo(secret=secret_in(links[victim.email]), since=None, now=now)
+    assert [app.type for app in Authenticator.objects.filter(user=victim)] == [kinds[0]]
+    assert [row.uid for row in SocialAccount.objects.filter(user=victim)] == ["before"]
+
+
+def secret_in(link: str) -> str:
+    return link.rstrip("/").rpartition("/")[2]
+
+
+@pytest.fixture
+def half_undone(victim: User) -> tuple[AccountChange, AccountChange]:
+    """Two changes an hour apart, of which the later one was undone after another hour."""
+    now = timezone.now()
+    former = "former@example.org"
+    takeovers.note(user=victim, what="x", before=[former], now=now - 3 * HOUR)
+    links = takeovers.note(user=victim, what="x", before=[former, "between@example.org"], now=now - 2 * HOUR)
+    first, second = AccountChange.objects.order_by("at")
+    takeovers.undo(secret=secret_in(links[former]), since=second.pk, now=now - HOUR)
+    first.refresh_from_db()
+    second.refresh_from_db()
+    assert (first.undone_at, second.undone_at) == (None, now - HOUR)
+    return first, second
+
+
+def test_addresses_before_an_undone_change_are_told_of_no_later_one(
+    victim: User, half_undone: tuple[AccountChange, AccountChange]
+) -> None:
+    links = takeovers.note(user=victim, what="x", before=["last@example.org"], now=timezone.now())
+    assert set(links) == {"former@example.org", "last@example.org"}
+
+
+@pytest.mark.parametrize("how", ["by a link", "by a maintainer"])
+def test_an_undone_change_keeps_its_time_when_the_account_is_given_back_later(
+    victim: User, maintainer: User, half_undone: tuple[AccountChange, AccountChange], how: str
+) -> None:
+    first, second = half_undone
+    now, address = timezone.now(), "former@example.org"
+    if how == "by a link":
+        secret = secret_in(takeovers._link(first, address))
+        takeovers.undo(secret=secret, since=None, now=now)
+    else:
+        takeovers.give_back(user=victim, address=address, reason="R", actor=maintainer, now=now)
+    times = dict(AccountChange.objects.filter(user=victim).values_list("pk", "undone_at"))
+    assert times == {first.pk: now, second.pk: second.undone_at}
