@@ -92,3 +92,15 @@ def test_maintainers_admit_from_the_page_of_a_team_and_nobody_else_does(
     assert keeper.get(link.attributes["href"] or "").status_code == 404
     with pytest.raises(NotMaintainer):
         admit(team, owner)
+
+
+def test_an_admission_that_somebody_else_than_a_maintainer_ends_stays(
+    by_admission: Edition, owner: User, stranger: User, maintainer: User
+) -> None:
+    rows = [admit(teams.team_of(user=user), maintainer) for user in (owner, stranger)]
+    for row in rows:
+        for actor in (owner, stranger):
+            with pytest.raises(NotMaintainer):
+                admissions.end(row=row, reason="R", actor=actor)
+    assert set(Admission.objects.all()) == set(rows)
+    assert not AuditEvent.objects.filter(verb="admission_ended").exists()

@@ -75,6 +75,24 @@ def test_a_quota_says_what_is_left_or_what_used_it_up(
     assert (now.next_slot_at is not None) is ("next slot" in sentence)
 
 
+@pytest.mark.parametrize("window", [HOUR, DAY, 7 * DAY])
+def test_a_file_leaves_the_window_and_a_rejected_one_the_day_exactly_at_the_edge(window: timedelta) -> None:
+    moment = timedelta(microseconds=1)
+
+    def times(span: timedelta) -> list[datetime]:
+        return [NOW - span - moment, NOW - span, NOW - span + moment, NOW - span + SECOND]
+
+    rules = QuotaOverride(quota_limit=9, quota_window=window, quota_rejected_limit=9)
+    now = usage.quota_at(
+        split=Split(name="test", title="Test"),
+        rules=rules,
+        spent=times(window),
+        rejected=times(DAY),
+        now=NOW,
+    )
+    assert (now.used, now.left, now.n_rejected) == (2, 7, 2)
+
+
 def test_who_waits_is_told_whole_seconds_and_one_at_least() -> None:
     waiting = quota(limit=9, spent=1, min_gap=2 * HOUR)
     opens_at = waiting.next_slot_at

@@ -23,10 +23,12 @@ from leaderboard.models import (
     User,
 )
 from leaderboard.people import teams
+from leaderboard.queue import lifecycle
 from leaderboard.quotas import usage
 from leaderboard.quotas.usage import Quota, QuotaExceeded
 from leaderboard.submissions import intake
 from tests import builders
+from tests.leaderboard.web.maintain import queue_rows
 
 DAY = timedelta(days=1)
 HOUR = timedelta(hours=1)
@@ -193,6 +195,17 @@ def test_rejected_files_have_a_limit_of_their_own(edition: Edition, owner: User)
     )
     assert caught.value.quota.left == 50
     assert send(owner, other(edition, 1), at=NOW + DAY).is_new
+
+
+def test_a_file_that_was_rejected_in_a_scoring_anew_alone_is_no_rejected_file(
+    edition: Edition, owner: User
+) -> None:
+    limit(limit=9, rejected_limit=9)
+    for priority in (Evaluation.PRIORITY_LIVE, *[Evaluation.PRIORITY_RESCORE] * 2):
+        queue_rows.queued(edition, owner, priority=priority)
+        lifecycle.finalise(queue_rows.claim(), queue_rows.REJECTED)
+    now = state(owner, at=timezone.now())
+    assert (now.used, now.n_rejected) == (0, 1)
 
 
 # --- without quota, and with another one -----------------------------------------------------------------
